@@ -1,0 +1,31 @@
+# `make demo` and `make test` set up .venv by themselves.
+PYTHON ?= python3
+BIN := .venv/bin
+PHOTO := docs/images/photo.png
+
+.PHONY: demo test lint bench clean
+
+.venv/ready: pyproject.toml constraints.txt setup.py proxyimg_codec/texture/_kernel.cpp
+	$(PYTHON) -m venv .venv
+	$(BIN)/pip install --quiet -c constraints.txt setuptools
+	$(BIN)/pip install --quiet -c constraints.txt -e '.[dev]'
+	touch $@
+
+demo: .venv/ready
+	@mkdir -p demo
+	$(BIN)/pxi-encode $(PHOTO) demo/photo.pxi --force
+	$(BIN)/pxi-decode demo/photo.pxi demo/photo.png --force
+	$(BIN)/pxi-decode demo/photo.pxi demo/photo-2x.png --scale 2 --force
+	@echo "Look at demo/photo.png and demo/photo-2x.png beside $(PHOTO)."
+
+test: .venv/ready
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/pytest
+
+bench: .venv/ready
+	$(BIN)/python -m benchmarks.figures
+
+clean:
+	rm -rf .venv demo build *.egg-info proxyimg_codec/texture/_kernel*.so

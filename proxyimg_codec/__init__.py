@@ -1,0 +1,63 @@
+"""ProxyImg codec: layered, resolution-free pictures in the `.pxi` format.
+
+    import proxyimg_codec as pxi
+
+    image = pxi.open("photo.pxi")
+    pixels = image.render(width=1024)
+
+Names are imported when first used: opening and rendering need numpy, encoding needs the
+``encode`` extra.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+from ._version import __version__ as __version__
+from .errors import (
+    FormatError,
+    InputError,
+    LimitError,
+    PxiError,
+    UnsupportedError,
+    UsageError,
+)
+from .limits import Limits
+
+if TYPE_CHECKING:
+    from .encoder.encode import encode as encode
+    from .image import Image as Image
+    from .image import Layer as Layer
+    from .image import from_bytes as from_bytes
+    from .image import open_image as open
+
+_LAZY = {
+    "Image": ("image", "Image"),
+    "Layer": ("image", "Layer"),
+    "open": ("image", "open_image"),
+    "from_bytes": ("image", "from_bytes"),
+    "encode": ("encoder.encode", "encode"),
+}
+
+__all__ = [
+    "FormatError",
+    "Image",
+    "InputError",
+    "Layer",
+    "LimitError",
+    "Limits",
+    "PxiError",
+    "UnsupportedError",
+    "UsageError",
+    "encode",
+    "from_bytes",
+    "open",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _LAZY:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module, attribute = _LAZY[name]
+    return getattr(importlib.import_module(f".{module}", __name__), attribute)

@@ -1,0 +1,48 @@
+"""What a reader is willing to spend on a file. Every number read from a file is checked here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .errors import LimitError
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Upper bounds for reading and rendering; the defaults suit a desktop program.
+
+    Attributes:
+        file_bytes: Size of a file.
+        chunks: Chunks in a file.
+        side: Canvas width or height in pixels.
+        layers: Layers in a file.
+        networks: Decoder networks in a file.
+        segments: Bézier segments in all boundaries together.
+        codes: Scalar codes in all textures together, stored or not.
+        parameters: Parameters of all networks together.
+        metadata_bytes: One metadata block after decompression.
+        output_pixels: Pixels of one rendered picture.
+    """
+
+    file_bytes: int = 1 << 30
+    chunks: int = 1 << 16
+    side: int = 1 << 20
+    layers: int = 1024
+    networks: int = 64
+    segments: int = 1 << 20
+    codes: int = 1 << 27
+    parameters: int = 1 << 22
+    metadata_bytes: int = 1 << 26
+    output_pixels: int = 1 << 28
+
+    def check(self, name: str, value: int) -> None:
+        """Raises `LimitError` if `value` exceeds the limit called `name`."""
+        allowed = getattr(self, name)
+        if value > allowed:
+            raise LimitError(
+                f"{name.replace('_', ' ')}: {value} exceeds the limit of {allowed}; "
+                f"raise it with Limits({name}=...) if you trust the file"
+            )
+
+
+DEFAULT_LIMITS = Limits()
