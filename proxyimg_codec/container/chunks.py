@@ -1,0 +1,113 @@
+"""Chunk framing: signature, version, and a run of checked chunks without gaps.
+
+A chunk is type (4 ASCII letters), u32 length, payload, u32 CRC-32 over type, length and payload;
+integers are little-endian. As in PNG, letter case carries bits: first letter lower case = ancillary
+(a reader may ignore the chunk), second lower = private, third is upper, fourth lower = safe to copy
+into an edited file by a program that does not know the chunk.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from ..errors import FormatError, UnsupportedError
+from ..limits import DEFAULT_LIMITS, Limits
+
+SIGNATURE = b"\x89PXI\r\n\x1a\n"
+VERSION = (0, 1)
+PREFIX = struct.Struct("<8sBBH")
+"""Signature, major version, minor version, reserved (0)."""
+
+FRAME = struct.Struct("<4sI")
+CHUNK_MAX = (1 << 31) - 1
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """A chunk: four-letter type and payload; `offset` is its place in the file it was read from."""
+
+    type: str
+    payload: bytes
+    offset: int | None = None
+
+    @property
+    def critical(self) -> bool:
+        """Whether a reader that does not know the type must refuse the file."""
+        return self.type[0].isupper()
+
+    @property
+    def safe_to_copy(self) -> bool:
+        """Whether an editor that does not know the type may keep the chunk."""
+        return self.type[3].islower()
+
+    @property
+    def size(self) -> int:
+        """Bytes in the file, framing included."""
+        return FRAME.size + len(self.payload) + 4
+
+
+def write(chunks: Iterable[Chunk]) -> bytes:
+    """The file made of `chunks`."""
+    parts = [PREFIX.pack(SIGNATURE, *VERSION, 0)]
+    for chunk in chunks:
+        body = FRAME.pack(chunk.type.encode("ascii"), len(chunk.payload)) + chunk.payload
+        parts += (body, struct.pack("<I", zlib.crc32(body)))
+    return b"".join(parts)
+
+
+def _check_prefix(data: bytes) -> None:
+    if not data:
+        raise FormatError("the file is empty")
+    if data[: len(SIGNATURE)] != SIGNATURE[: len(data)]:
+        raise FormatError("not a .pxi file: the signature is missing", offset=0)
+    if len(data) < PREFIX.size:
+        raise FormatError("truncated in the signature", offset=len(data))
+    _, major, minor, reserved = PREFIX.unpack_from(data)
+    if (major, minor) != VERSION:
+        raise UnsupportedError(
+            f"the file has format version {major}.{minor}, this program reads "
+            f"{VERSION[0]}.{VERSION[1]}; update proxyimg-codec"
+        )
+    if reserved:
+        raise FormatError("reserved field is not zero", offset=10)
+
+
+def _valid_type(raw: bytes) -> bool:
+    return raw.isalpha() and raw[2:3].isupper()
+
+
+def read(data: bytes, limits: Limits = DEFAULT_LIMITS) -> list[Chunk]:
+    """All chunks of a file, in order, each CRC checked.
+
+    Raises:
+        FormatError: Wrong signature, truncation, bad CRC, bad type, or bytes after the last chunk.
+        UnsupportedError: Another format version.
+        LimitError: Too large or too many chunks.
+    """
+    limits.check("file_bytes", len(data))
+    _check_prefix(data)
+    chunks: list[Chunk] = []
+    at = PREFIX.size
+    while at < len(data):
+        if chunks and chunks[-1].type == "TAIL":
+            raise FormatError("bytes follow the last chunk", offset=at)
+        limits.check("chunks", len(chunks) + 1)
+        if len(data) - at < FRAME.size + 4:
+            raise FormatError("truncated in a chunk header", offset=at)
+        raw, length = FRAME.unpack_from(data, at)
+        if not _valid_type(raw):
+            raise FormatError("chunk type is not four letters with the third upper case", offset=at)
+        name = f"chunk {raw.decode()}"
+        end = at + FRAME.size + length
+        if length > CHUNK_MAX or end + 4 > len(data):
+            raise FormatError("truncated: the chunk runs past the end of the file", name, at)
+        if zlib.crc32(data[at:end]) != int.from_bytes(data[end : end + 4], "little"):
+            raise FormatError("CRC mismatch: the file is damaged", name, at)
+        chunks.append(Chunk(raw.decode(), data[at + FRAME.size : end], at))
+        at = end + 4
+    if not chunks or chunks[-1].type != "TAIL":
+        raise FormatError("truncated: the TAIL chunk is missing", offset=at)
+    return chunks
