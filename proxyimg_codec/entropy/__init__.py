@@ -1,0 +1,1 @@
+"""Entropy coding: interleaved rANS with an adaptive integer model. All arithmetic is integer."""

@@ -1,0 +1,167 @@
+"""Adaptive coding of small integer arrays: codes, weights, path deltas and masks.
+
+Values of up to 8 bits in an array [C, H, W] are coded where a mask [H, W] says so. The upper
+(at most four) bits are coded with adaptive counts, selected by the already known neighbours; lower
+bits are stored raw. Positions are visited by wavefronts t = x + 2 y, so that left, upper left,
+upper and upper right neighbours are known while a whole wavefront is one array operation; counts
+change after a wavefront, never inside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FormatError
+from .rans import SCALE_BITS, Decoder, Encoder, lanes_log2_for
+
+MODEL_BITS = 4
+"""Bits of a value that the adaptive model codes; lower ones are raw."""
+
+COUNT_START, COUNT_STEP, COUNT_LIMIT = 8, 32, 1 << 14
+"""Adaptation: initial count of a symbol, its increment, and the sum at which a row is halved."""
+
+Ints = NDArray[np.int64]
+
+
+def _contexts(known: Ints, y: Ints, x: Ints, alphabet: int) -> Ints:
+    """Context [n, C] of positions y, x [n] from `known` [H + 1, W + 2, C], where -1 is unknown."""
+    left, up = known[y + 1, x], known[y, x + 1]
+    upper_left, upper_right = known[y, x], known[y, x + 2]
+    if alphabet == 2:
+        bits = (left, up, upper_left, upper_right)
+        return sum((np.maximum(v, 0) << i for i, v in enumerate(bits)), np.zeros_like(left))
+    total, weight = np.zeros_like(left), np.zeros_like(left)
+    for v, w in ((left, 2), (up, 2), (upper_left, 1), (upper_right, 1)):
+        total += w * np.maximum(v, 0)
+        weight += w * (v >= 0)
+    return np.where(weight > 0, (2 * total + weight) // np.maximum(2 * weight, 1), alphabet)
+
+
+class _Model:
+    """Adaptive counts [channel, context, symbol] and the distributions made of them."""
+
+    def __init__(self, channels: int, alphabet: int) -> None:
+        contexts = 16 if alphabet == 2 else alphabet + 1
+        self._counts = np.full((channels * contexts, alphabet), COUNT_START, np.int64)
+        self._contexts = contexts
+        self._channel = np.arange(channels) * contexts
+
+    def rows(self, context: Ints) -> Ints:
+        """Flat row numbers [n * C] of contexts [n, C]."""
+        return (context + self._channel).ravel()
+
+    def cumulative(self, rows: Ints) -> Ints:
+        """Cumulative frequencies [n, A + 1]: every symbol has at least 1, all sum to 2**14.
+
+        The rounding remainder goes to the last symbol.
+        """
+        counts = self._counts[rows]
+        n, a = counts.shape
+        room = (1 << SCALE_BITS) - a
+        out = np.zeros((n, a + 1), np.int64)
+        np.cumsum(room * counts // counts.sum(1, keepdims=True) + 1, axis=1, out=out[:, 1:])
+        out[:, a] = 1 << SCALE_BITS
+        return out
+
+    def update(self, rows: Ints, symbols: Ints) -> None:
+        """Adds the symbols of one wavefront."""
+        np.add.at(self._counts, (rows, symbols), COUNT_STEP)
+        touched = np.unique(rows)
+        over = touched[self._counts[touched].sum(1) > COUNT_LIMIT]
+        self._counts[over] = (self._counts[over] + 1) >> 1
+
+
+def _wavefronts(stored: NDArray[np.bool_]) -> Iterator[tuple[Ints, Ints]]:
+    """Positions (y, x) of each wavefront in coding order; y ascends within a wavefront."""
+    y, x = np.nonzero(stored)
+    t = x + 2 * y
+    order = np.lexsort((y, t))
+    y, x, t = y[order], x[order], t[order]
+    bounds = np.flatnonzero(np.diff(t, prepend=-1, append=-1))
+    for a, b in pairwise(bounds):
+        yield y[a:b], x[a:b]
+
+
+def encode(values: NDArray[np.integer], bits: int, stored: NDArray[np.bool_]) -> bytes:
+    """Codes `values` [C, H, W], in 0 .. 2**bits - 1 with bits in 1..8, where `stored` [H, W]."""
+    high = min(bits, MODEL_BITS)
+    low = bits - high
+    channels, height, width = values.shape
+    model = _Model(channels, 1 << high)
+    known = np.full((height + 1, width + 2, channels), -1, np.int64)
+    top = np.moveaxis(values.astype(np.int64) >> low, 0, -1)
+    encoder = Encoder(lanes_log2_for(int(stored.sum()) * channels))
+    for y, x in _wavefronts(stored):
+        rows = model.rows(_contexts(known, y, x, 1 << high))
+        symbols = top[y, x].ravel()
+        cdf = model.cumulative(rows)
+        at = np.arange(len(symbols))
+        start = cdf[at, symbols]
+        encoder.put(start, cdf[at, symbols + 1] - start)
+        model.update(rows, symbols)
+        known[y + 1, x + 1] = top[y, x]
+    raw = pack_bits(values[:, stored].astype(np.int64) & ((1 << low) - 1), low)
+    return encoder.finish() + raw
+
+
+def decode(
+    data: bytes, shape: tuple[int, int, int], bits: int, stored: NDArray[np.bool_]
+) -> NDArray[np.uint8]:
+    """Inverse of `encode`: values [C, H, W]; 0 where not stored.
+
+    Raises:
+        FormatError: The stream is corrupt, or longer or shorter than its symbols.
+    """
+    high = min(bits, MODEL_BITS)
+    low = bits - high
+    channels, height, width = shape
+    model = _Model(channels, 1 << high)
+    known = np.full((height + 1, width + 2, channels), -1, np.int64)
+    decoder = Decoder(data)
+    for y, x in _wavefronts(stored):
+        rows = model.rows(_contexts(known, y, x, 1 << high))
+        cdf = model.cumulative(rows)
+        symbols = np.empty(len(rows), np.int64)
+        for i in range(0, len(rows), decoder.lanes):
+            group = cdf[i : i + decoder.lanes]
+            slot = decoder.slots(len(group))
+            found = (group[:, 1:] <= slot[:, None]).sum(1)
+            at = np.arange(len(group))
+            start = group[at, found]
+            decoder.advance(slot, start, group[at, found + 1] - start)
+            symbols[i : i + decoder.lanes] = found
+        model.update(rows, symbols)
+        known[y + 1, x + 1] = symbols.reshape(-1, channels)
+    decoder.finish()
+    out = np.zeros(shape, np.uint8)
+    out[:, stored] = known[1:, 1:-1][stored].T << low
+    out[:, stored] |= unpack_bits(data[decoder.end :], out[:, stored].shape, low)
+    return out
+
+
+def pack_bits(values: Ints, width: int) -> bytes:
+    """Packs the low `width` bits of every value, most significant first, zero-padded to bytes."""
+    planes = (values.ravel()[:, None] >> np.arange(width - 1, -1, -1)) & 1
+    return np.packbits(planes.astype(np.uint8).ravel()).tobytes()
+
+
+def unpack_bits(data: bytes, shape: tuple[int, ...], width: int) -> NDArray[np.uint8]:
+    """Inverse of `pack_bits` for values of up to 8 bits; `data` must have exactly the right length.
+
+    Raises:
+        FormatError: Wrong length, or padding bits that are not zero.
+    """
+    count = int(np.prod(shape)) * width
+    if len(data) != (count + 7) // 8:
+        raise FormatError(f"expected {(count + 7) // 8} bytes of raw bits, found {len(data)}")
+    bits = np.unpackbits(np.frombuffer(data, np.uint8))
+    if bits[count:].any():
+        raise FormatError("padding bits are not zero")
+    weights = 1 << np.arange(width - 1, -1, -1)
+    return (
+        (bits[:count].reshape(int(np.prod(shape)), width) @ weights).astype(np.uint8).reshape(shape)
+    )
