@@ -1,0 +1,1 @@
+"""Boundaries and their coverage: integer arithmetic, the same in every decoder."""
