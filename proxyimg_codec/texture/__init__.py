@@ -1,0 +1,1 @@
+"""Textures: planes of codes, the network that decodes them, and the engines that run it."""

@@ -1,0 +1,413 @@
+// Fused kernel of the implicit texture coder: gather -> encode -> MLP, forward and training.
+//
+// numpy (render) and torch (training) do the same arithmetic; this file is the fast engine and is
+// judged by them. Data is processed in blocks of BLOCK entries in structure-of-arrays layout
+// [feature][entry], so that every inner loop runs along entries with full vectors.
+//
+// An *entry* is one layer's contribution to one pixel: four bilinear taps into the table of codes.
+// Training is deterministic for any number of threads: a batch is cut into PARTS fixed slices with
+// gradient buffers of their own, which are added in a fixed order.
+
+#include <algorithm>
+#include <barrier>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <thread>
+#include <vector>
+
+typedef float vec __attribute__((vector_size(64)));
+static const int LANES = 16, BLOCK = 256, NV = BLOCK / LANES, PARTS = 4, MAX_LAYERS = 10;
+static const float PI = 3.14159265358979f;
+
+extern "C" {
+struct Net {  // shape of the decoder network; weights are [out][in] rows, then the biases, per layer
+    int32_t dim, octaves, hidden, depth, channels;
+};
+struct Entries {  // taps of every entry: rows base, base+1, base+stride, base+stride+1 of the codes
+    const int32_t *base, *stride;
+    const float *fx, *fy;
+};
+struct Train {
+    Net net;
+    Entries entries;
+    int64_t n_codes;
+    const int32_t *first;     // [pixels + 1] range of entries of each pixel, front to back
+    const float *coverage;    // [entries]
+    const float *target;      // [pixels][channels], premultiplied
+    float *codes, *codes_m, *codes_v;      // [n_codes][dim] and Adam moments
+    float *weights, *weights_m, *weights_v;
+    const uint8_t *plane;     // [n_codes] which row of code_steps
+    const float *code_steps;  // [planes][dim]; used when code_max > 0
+    const float *row_steps;   // one per output row of the network
+    int32_t code_max, weight_max;  // symbols lie in -max-1 .. max; 0 switches quantization off
+    int32_t threads;
+};
+}
+
+namespace {
+
+struct Layout {
+    int in[MAX_LAYERS], out[MAX_LAYERS], weight[MAX_LAYERS], bias[MAX_LAYERS], row[MAX_LAYERS];
+    int layers, encoded, total;
+    explicit Layout(const Net &n) {
+        layers = n.depth + 1;
+        encoded = n.dim * (2 * n.octaves + 1);
+        int offset = 0, rows = 0;
+        for (int l = 0; l < layers; l++) {
+            in[l] = l ? n.hidden : encoded;
+            out[l] = l == n.depth ? n.channels : n.hidden;
+            weight[l] = offset, bias[l] = offset + in[l] * out[l], row[l] = rows;
+            offset = bias[l] + out[l], rows += out[l];
+        }
+        total = offset;
+    }
+};
+
+struct Buffer {  // 64-byte aligned floats
+    std::vector<float> store;
+    float *p;
+    explicit Buffer(size_t n) : store(n + 16) {
+        p = (float *)(((uintptr_t)store.data() + 63) & ~(uintptr_t)63);
+    }
+    Buffer(const Buffer &) = delete;
+};
+
+// out[j] = bias[j] + sum_i w[j * ws + i * wi] * in[i], four rows by four vectors at a time.
+void matmul(const float *w, int ws, int wi, const float *bias, const vec *in, vec *out, int ni, int no) {
+    for (int c = 0; c < NV; c += 4) {
+        int j = 0;
+        for (; j + 4 <= no; j += 4) {
+            vec a[4][4];
+            for (int r = 0; r < 4; r++)
+                for (int k = 0; k < 4; k++) a[r][k] = (vec){} + (bias ? bias[j + r] : 0.f);
+            for (int i = 0; i < ni; i++) {
+                const vec *x = in + i * NV + c;
+                for (int r = 0; r < 4; r++) {
+                    float s = w[(j + r) * ws + i * wi];
+                    for (int k = 0; k < 4; k++) a[r][k] += s * x[k];
+                }
+            }
+            for (int r = 0; r < 4; r++)
+                for (int k = 0; k < 4; k++) out[(j + r) * NV + c + k] = a[r][k];
+        }
+        for (; j < no; j++) {
+            vec a[4];
+            for (int k = 0; k < 4; k++) a[k] = (vec){} + (bias ? bias[j] : 0.f);
+            for (int i = 0; i < ni; i++)
+                for (int k = 0; k < 4; k++) a[k] += w[j * ws + i * wi] * in[i * NV + c + k];
+            for (int k = 0; k < 4; k++) out[j * NV + c + k] = a[k];
+        }
+    }
+}
+
+float sum(vec v) {
+    float s = 0;
+    for (int i = 0; i < LANES; i++) s += v[i];
+    return s;
+}
+
+// dw[j][i] += sum over entries of d[j] * x[i]; db[j] += sum of d[j].
+void outer(const vec *d, const vec *x, float *dw, float *db, int ni, int no) {
+    for (int j = 0; j < no; j += 4) {
+        int rows = std::min(4, no - j);
+        for (int i = 0; i < ni; i += 4) {
+            int cols = std::min(4, ni - i);
+            vec a[4][4] = {};
+            if (rows == 4 && cols == 4) {
+                for (int c = 0; c < NV; c++) {
+                    vec xx[4];
+                    for (int s = 0; s < 4; s++) xx[s] = x[(i + s) * NV + c];
+                    for (int r = 0; r < 4; r++) {
+                        vec dd = d[(j + r) * NV + c];
+                        for (int s = 0; s < 4; s++) a[r][s] += dd * xx[s];
+                    }
+                }
+            } else {
+                for (int r = 0; r < rows; r++)
+                    for (int s = 0; s < cols; s++)
+                        for (int c = 0; c < NV; c++) a[r][s] += d[(j + r) * NV + c] * x[(i + s) * NV + c];
+            }
+            for (int r = 0; r < rows; r++)
+                for (int s = 0; s < cols; s++) dw[(j + r) * ni + i + s] += sum(a[r][s]);
+        }
+        for (int r = 0; r < rows; r++) {
+            vec a = {};
+            for (int c = 0; c < NV; c++) a += d[(j + r) * NV + c];
+            db[j + r] += sum(a);
+        }
+    }
+}
+
+// sin(pi x) and cos(pi x): reduced to |r| <= 1/2, Taylor polynomials (error < 1e-7).
+inline void sincospi(const float *x, float *s, float *c, int n) {
+    for (int i = 0; i < n; i++) {
+        float k = nearbyintf(x[i]), r = (x[i] - k) * PI, r2 = r * r;
+        float sign = 1.f - 2.f * (float)((int)k & 1);
+        s[i] = sign * r * (1 + r2 * (-1.f / 6 + r2 * (1.f / 120 + r2 * (-1.f / 5040 +
+               r2 * (1.f / 362880 - r2 * (1.f / 39916800))))));
+        c[i] = sign * (1 + r2 * (-.5f + r2 * (1.f / 24 + r2 * (-1.f / 720 + r2 * (1.f / 40320 +
+               r2 * (-1.f / 3628800 + r2 * (1.f / 479001600)))))));
+    }
+}
+
+struct Block {  // the working memory of one thread
+    const Net net;
+    const Layout lay;
+    Buffer feature, encoded, d_feature, d_encoded, acts, d_a, d_b;
+    explicit Block(const Net &n)
+        : net(n), lay(n), feature(n.dim * BLOCK), encoded(lay.encoded * BLOCK), d_feature(n.dim * BLOCK),
+          d_encoded(lay.encoded * BLOCK), acts((size_t)lay.layers * width() * BLOCK),
+          d_a(width() * BLOCK), d_b(width() * BLOCK) {}
+    int width() const { return std::max(net.hidden, net.channels); }
+    float *act(int l) { return acts.p + (size_t)l * width() * BLOCK; }
+    float *output() { return act(lay.layers - 1); }
+
+    void gather(const float *codes, const Entries &e, int64_t start, int n, const int32_t *index) {
+        const int D = net.dim;
+        for (int p = 0; p < BLOCK; p++) {
+            int64_t k = p < n ? (index ? index[p] : start + p) : (index ? index[0] : start);
+            const float *a = codes + (int64_t)e.base[k] * D, *b = a + (int64_t)e.stride[k] * D;
+            float x = e.fx[k], y = e.fy[k], w11 = x * y, w10 = x - w11, w01 = y - w11, w00 = 1 - x - w01;
+            for (int d = 0; d < D; d++)
+                feature.p[d * BLOCK + p] = w00 * a[d] + w10 * a[D + d] + w01 * b[d] + w11 * b[D + d];
+        }
+    }
+
+    void forward(const float *weights) {
+        const int n = net.dim * BLOCK;
+        std::memcpy(encoded.p, feature.p, n * sizeof(float));
+        if (net.octaves) {
+            float *s = encoded.p + n, *c = s + n;
+            sincospi(feature.p, s, c, n);
+            for (int k = 1; k < net.octaves; k++, s += 2 * n, c += 2 * n)
+                for (int i = 0; i < n; i++) {
+                    s[2 * n + i] = 2 * s[i] * c[i];
+                    c[2 * n + i] = 1 - 2 * s[i] * s[i];
+                }
+        }
+        const float *in = encoded.p;
+        for (int l = 0; l < lay.layers; l++) {
+            float *out = act(l);
+            matmul(weights + lay.weight[l], lay.in[l], 1, weights + lay.bias[l], (const vec *)in, (vec *)out,
+                   lay.in[l], lay.out[l]);
+            if (l + 1 < lay.layers)
+                for (int i = 0; i < lay.out[l] * BLOCK; i++) out[i] = std::max(out[i], 0.f);
+            in = out;
+        }
+    }
+
+    // d_a holds the gradient of the output; leaves the gradient of the features in d_feature.
+    void backward(const float *weights, float *g_weights) {
+        float *d = d_a.p, *next = d_b.p;
+        for (int l = lay.layers - 1; l >= 0; l--) {
+            const float *in = l ? act(l - 1) : encoded.p;
+            outer((vec *)d, (const vec *)in, g_weights + lay.weight[l], g_weights + lay.bias[l], lay.in[l],
+                  lay.out[l]);
+            float *to = l ? next : d_encoded.p;
+            matmul(weights + lay.weight[l], 1, lay.in[l], nullptr, (vec *)d, (vec *)to, lay.out[l], lay.in[l]);
+            if (l) {
+                for (int i = 0; i < lay.in[l] * BLOCK; i++) to[i] = in[i] > 0 ? to[i] : 0.f;
+                std::swap(d, next);
+            }
+        }
+        const int n = net.dim * BLOCK;
+        std::memcpy(d_feature.p, d_encoded.p, n * sizeof(float));
+        float scale = PI;
+        for (int k = 0; k < net.octaves; k++, scale *= 2) {
+            const float *s = encoded.p + (2 * k + 1) * n, *c = s + n;
+            const float *ds = d_encoded.p + (2 * k + 1) * n, *dc = ds + n;
+            for (int i = 0; i < n; i++) d_feature.p[i] += scale * (ds[i] * c[i] - dc[i] * s[i]);
+        }
+    }
+
+    void scatter(float *g_codes, const Entries &e, const int32_t *index, int n) {
+        const int D = net.dim;
+        for (int p = 0; p < n; p++) {
+            int64_t k = index[p];
+            float *a = g_codes + (int64_t)e.base[k] * D, *b = a + (int64_t)e.stride[k] * D;
+            float x = e.fx[k], y = e.fy[k], w11 = x * y, w10 = x - w11, w01 = y - w11, w00 = 1 - x - w01;
+            for (int d = 0; d < D; d++) {
+                float g = d_feature.p[d * BLOCK + p];
+                a[d] += w00 * g, a[D + d] += w10 * g, b[d] += w01 * g, b[D + d] += w11 * g;
+            }
+        }
+    }
+};
+
+// Composites the entries of one pixel and turns the squared error into gradients of the outputs.
+// Back to front: R_k = c_k p_k + (1 - c_k a_k) R_{k+1}, with a_k = 1 where the file has no alpha.
+double composite_loss(Block &b, const float *coverage, const float *target, int at, int n, float scale) {
+    const int C = b.net.channels;
+    const bool alpha = C == 4;
+    float behind[64][4], through[64], out[4] = {0, 0, 0, 0};
+    float *o = b.output(), *d = b.d_a.p;
+    auto opacity = [&](int k) {
+        return coverage[k] * (alpha ? std::clamp(o[3 * BLOCK + at + k], 0.f, 1.f) : 1.f);
+    };
+    for (int k = n - 1; k >= 0; k--) {
+        std::memcpy(behind[k], out, sizeof out);
+        float keep = 1 - opacity(k);
+        for (int c = 0; c < C; c++) out[c] = coverage[k] * o[c * BLOCK + at + k] + keep * out[c];
+    }
+    through[0] = 1;
+    for (int k = 1; k < n; k++) through[k] = through[k - 1] * (1 - opacity(k - 1));
+    double loss = 0;
+    float g[4];
+    for (int c = 0; c < C; c++) {
+        float r = out[c] - target[c];
+        loss += r * r;
+        g[c] = r * scale;
+    }
+    for (int k = 0; k < n; k++) {
+        float w = through[k] * coverage[k], hidden = 0;
+        for (int c = 0; c < C; c++) {
+            d[c * BLOCK + at + k] = w * g[c];
+            hidden += g[c] * behind[k][c];
+        }
+        if (alpha) d[3 * BLOCK + at + k] -= w * hidden;
+    }
+    return loss;
+}
+
+struct Gradients {
+    std::vector<float> codes, weights;
+    double loss = 0;
+};
+
+void train_slice(const Train &t, Block &b, const float *codes, const float *weights, const int32_t *pixels,
+                 int64_t n, float scale, Gradients &g) {
+    std::fill(g.codes.begin(), g.codes.end(), 0.f);
+    std::fill(g.weights.begin(), g.weights.end(), 0.f);
+    g.loss = 0;
+    int32_t index[BLOCK];
+    for (int64_t i = 0; i < n;) {
+        int filled = 0;
+        int64_t j = i;
+        for (; j < n; j++) {
+            int32_t a = t.first[pixels[j]], z = t.first[pixels[j] + 1];
+            if (filled + z - a > BLOCK) break;
+            for (int32_t k = a; k < z; k++) index[filled++] = k;
+        }
+        b.gather(codes, t.entries, 0, filled, index);
+        b.forward(weights);
+        std::memset(b.d_a.p, 0, sizeof(float) * t.net.channels * BLOCK);
+        for (int at = 0; i < j; i++) {
+            int32_t a = t.first[pixels[i]], count = t.first[pixels[i] + 1] - a;
+            g.loss += composite_loss(b, t.coverage + a, t.target + (int64_t)pixels[i] * t.net.channels, at,
+                                     count, scale);
+            at += count;
+        }
+        b.backward(weights, g.weights.data());
+        b.scatter(g.codes.data(), t.entries, index, filled);
+    }
+}
+
+struct Rate {
+    float lr, c1, c2;
+};
+
+inline float adam(float p, float g, float &m, float &v, const Rate &r) {
+    const float b1 = .9f, b2 = .99f, eps = 1e-8f;
+    m = b1 * m + (1 - b1) * g;
+    v = b2 * v + (1 - b2) * g * g;
+    return p - r.lr * (m * r.c1) / (std::sqrt(v * r.c2) + eps);
+}
+
+inline float round_to(float x, float step, float top) {
+    return std::clamp(nearbyintf(x / step), -top - 1, top) * step;
+}
+
+// Quantized copies that the forward pass reads (straight-through estimator: gradients go to the originals).
+void quantize_codes(const Train &t, float *out, int64_t from, int64_t to) {
+    const int D = t.net.dim;
+    for (int64_t i = from; i < to; i++) {
+        const float *step = t.code_steps + t.plane[i] * D;
+        for (int d = 0; d < D; d++) out[i * D + d] = round_to(t.codes[i * D + d], step[d], t.code_max);
+    }
+}
+
+void quantize_weights(const Train &t, const Layout &lay, float *out) {
+    std::memcpy(out, t.weights, lay.total * sizeof(float));
+    for (int l = 0; l < lay.layers; l++)
+        for (int j = 0; j < lay.out[l]; j++)
+            for (int i = 0; i < lay.in[l]; i++) {
+                int k = lay.weight[l] + j * lay.in[l] + i;
+                out[k] = round_to(t.weights[k], t.row_steps[lay.row[l] + j], t.weight_max);
+            }
+}
+
+}  // namespace
+
+extern "C" {
+
+// Runs `steps` Adam steps; `pixels` is [steps][batch]. Returns the mean loss of the steps.
+double pxi_train(const Train *task, const int32_t *pixels, int64_t steps, int64_t batch, int64_t done,
+                 const float *lr_codes, const float *lr_weights) {
+    const Train &t = *task;
+    const Layout lay(t.net);
+    const int64_t rows = t.n_codes, D = t.net.dim;
+    const float scale = 2.f / (t.net.channels * batch);
+    std::vector<float> q_codes(t.code_max ? rows * D : 0), q_weights(lay.total);
+    Gradients parts[PARTS];
+    for (auto &g : parts) g.codes.resize(rows * D), g.weights.resize(lay.total);
+    const float *codes = t.code_max ? q_codes.data() : t.codes;
+    const float *weights = t.weight_max ? q_weights.data() : t.weights;
+    if (t.code_max) quantize_codes(t, q_codes.data(), 0, rows);
+    if (t.weight_max) quantize_weights(t, lay, q_weights.data());
+
+    const int threads = std::clamp(t.threads, 1, PARTS);
+    std::barrier<> sync(threads);
+    double loss = 0;
+    auto work = [&](int id) {
+        Block block(t.net);
+        for (int64_t s = 0; s < steps; s++) {
+            const int32_t *px = pixels + s * batch;
+            for (int p = id; p < PARTS; p += threads) {
+                int64_t a = batch * p / PARTS, z = batch * (p + 1) / PARTS;
+                train_slice(t, block, codes, weights, px + a, z - a, scale, parts[p]);
+            }
+            sync.arrive_and_wait();
+            float step = (float)(done + s + 1);
+            Rate rc{lr_codes[s], 1 / (1 - std::pow(.9f, step)), 1 / (1 - std::pow(.99f, step))}, rw = rc;
+            rw.lr = lr_weights[s];
+            int64_t from = rows * id / threads, to = rows * (id + 1) / threads;
+            for (int64_t i = from * D; i < to * D; i++) {
+                float g = parts[0].codes[i];
+                for (int p = 1; p < PARTS; p++) g += parts[p].codes[i];
+                t.codes[i] = adam(t.codes[i], g, t.codes_m[i], t.codes_v[i], rc);
+            }
+            if (t.code_max) quantize_codes(t, q_codes.data(), from, to);
+            if (id == 0) {
+                for (int i = 0; i < lay.total; i++) {
+                    float g = parts[0].weights[i];
+                    for (int p = 1; p < PARTS; p++) g += parts[p].weights[i];
+                    t.weights[i] = adam(t.weights[i], g, t.weights_m[i], t.weights_v[i], rw);
+                }
+                for (auto &g : parts) loss += g.loss;
+                if (t.weight_max) quantize_weights(t, lay, q_weights.data());
+            }
+            sync.arrive_and_wait();
+        }
+    };
+    std::vector<std::thread> pool;
+    for (int i = 1; i < threads; i++) pool.emplace_back(work, i);
+    work(0);
+    for (auto &th : pool) th.join();
+    return loss / ((double)t.net.channels * batch * std::max<int64_t>(steps, 1));
+}
+
+// Network output of `n` entries: out is [n][channels].
+void pxi_forward(const Net *net, const float *codes, const float *weights, const Entries *entries, int64_t n,
+                 float *out) {
+    Block block(*net);
+    for (int64_t a = 0; a < n; a += BLOCK) {
+        int count = (int)std::min<int64_t>(BLOCK, n - a);
+        block.gather(codes, *entries, a, count, nullptr);
+        block.forward(weights);
+        for (int p = 0; p < count; p++)
+            for (int c = 0; c < net->channels; c++)
+                out[(a + p) * net->channels + c] = block.output()[c * BLOCK + p];
+    }
+}
+}

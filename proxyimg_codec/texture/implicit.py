@@ -1,0 +1,143 @@
+"""The implicit texture: a plane of codes in the layer's box, decoded by an MLP."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..container import texr
+from ..entropy import arrays
+from ..errors import FormatError
+from .diffusion import FRACTION_BITS, fill
+from .network import Floats, Network, read_halves
+
+Box = tuple[int, int, int, int]
+
+
+class Taps(NamedTuple):
+    """Bilinear taps of N points into codes [rows, D]: rows base, base + 1 and those `stride` on.
+
+    Attributes:
+        base: int32 [N] row of the upper left code.
+        fx: float32 [N] horizontal fraction.
+        fy: float32 [N] vertical fraction.
+        stride: Rows from a code to the one below.
+    """
+
+    base: NDArray[np.int32]
+    fx: Floats
+    fy: Floats
+    stride: int
+
+
+def taps(x: NDArray[np.float64], y: NDArray[np.float64], box: Box, columns: int, rows: int) -> Taps:
+    """Taps of canvas points x, y [N] in a plane whose corner codes sit on the corners of `box`.
+
+    Points outside the box take the value at its rim.
+    """
+    x0, y0, width, height = box
+    gx = np.clip((x - x0) * ((columns - 1) / width), 0, columns - 1)
+    gy = np.clip((y - y0) * ((rows - 1) / height), 0, rows - 1)
+    ix = np.minimum(gx.astype(np.int32), columns - 2)
+    iy = np.minimum(gy.astype(np.int32), rows - 2)
+    return Taps(
+        iy * np.int32(columns) + ix,
+        (gx - ix).astype(np.float32),
+        (gy - iy).astype(np.float32),
+        columns,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class ImplicitTexture:
+    """A quantized plane of codes.
+
+    Attributes:
+        network: Index of the network in the file.
+        bits: Bits a code, 2..8.
+        steps: float16 [D] quantization step of each feature.
+        codes: int8 [D, rows, columns]; 0 where not stored.
+        stored: bool [rows, columns].
+    """
+
+    network: int
+    bits: int
+    steps: NDArray[np.float16]
+    codes: NDArray[np.int8]
+    stored: NDArray[np.bool_]
+
+    @property
+    def grid(self) -> tuple[int, int]:
+        """Columns and rows of the plane."""
+        return self.codes.shape[2], self.codes.shape[1]
+
+    @cached_property
+    def table(self) -> Floats:
+        """Dequantized codes [rows * columns, D], holes filled by the normative diffusion."""
+        filled = fill(self.codes, self.stored)
+        scale = self.steps.astype(np.float32) / (1 << FRACTION_BITS)
+        return np.ascontiguousarray(
+            np.moveaxis(filled, 0, -1).reshape(-1, len(self.steps)).astype(np.float32) * scale
+        )
+
+    def taps(self, x: NDArray[np.float64], y: NDArray[np.float64], box: Box) -> Taps:
+        """Taps of canvas points x, y [N]; `box` is the layer's rectangle."""
+        return taps(x, y, box, *self.grid)
+
+    def features(self, at: Taps) -> Floats:
+        """Features [N, D] at N points."""
+        table = self.table
+        fx, fy = at.fx[:, None], at.fy[:, None]
+        top = table[at.base] * (1 - fx)
+        top += table[at.base + 1] * fx
+        bottom = table[at.base + at.stride] * (1 - fx)
+        bottom += table[at.base + at.stride + 1] * fx
+        top += (bottom - top) * fy
+        return top
+
+
+def pack(texture: ImplicitTexture) -> dict[str, Any]:
+    """The fields of TEXR."""
+    stored = b""
+    if not texture.stored.all():
+        stored = arrays.encode(
+            texture.stored[None].astype(np.int64), 1, np.ones(texture.stored.shape, bool)
+        )
+    values = texture.codes.astype(np.int64) + (1 << (texture.bits - 1))
+    return {
+        "coder": texr.IMPLICIT,
+        "network": texture.network,
+        "grid": list(texture.grid),
+        "bits": texture.bits,
+        "steps": texture.steps.astype("<f2").tobytes(),
+        "stored": stored,
+        "codes": arrays.encode(values, texture.bits, texture.stored),
+    }
+
+
+def unpack(
+    fields: Mapping[str, Any], networks: tuple[Network, ...], where: str = "chunk TEXR"
+) -> ImplicitTexture:
+    """Inverse of `pack`; `networks` are those of the file.
+
+    Raises:
+        FormatError: Corrupt streams, wrong lengths, or no stored code at all.
+    """
+    columns, rows = fields["grid"]
+    dim = networks[fields["network"]].shape.dim
+    steps = read_halves(fields["steps"], dim, where, positive=True)
+    stored = np.ones((rows, columns), bool)
+    if fields["stored"]:
+        stored = arrays.decode(fields["stored"], (1, rows, columns), 1, stored)[0].astype(bool)
+        if stored.all() or not stored.any():
+            raise FormatError("the mask of stored codes is full or empty", where)
+    values = arrays.decode(fields["codes"], (dim, rows, columns), fields["bits"], stored)
+    codes = (values.astype(np.int16) - (1 << (fields["bits"] - 1))).astype(np.int8)
+    return ImplicitTexture(
+        fields["network"], fields["bits"], steps, np.where(stored, codes, np.int8(0)), stored
+    )

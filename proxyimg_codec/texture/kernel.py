@@ -1,0 +1,108 @@
+"""The compiled kernel (`_kernel.cpp`) behind ctypes: a fast engine for rendering and training.
+
+It is optional: `available()` is false where the package was installed without a C++ compiler.
+"""
+
+from __future__ import annotations
+
+import ctypes as ct
+import functools
+import importlib.machinery
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Net(ct.Structure):
+    """Shape of a decoder network; mirrors `struct Net`."""
+
+    _fields_ = [(n, ct.c_int32) for n in ("dim", "octaves", "hidden", "depth", "channels")]
+
+
+class Entries(ct.Structure):
+    """Bilinear taps of every entry; mirrors `struct Entries`."""
+
+    _fields_ = [(n, ct.c_void_p) for n in ("base", "stride", "fx", "fy")]
+
+
+class Train(ct.Structure):
+    """A training problem; mirrors `struct Train`."""
+
+    _fields_ = [
+        ("net", Net),
+        ("entries", Entries),
+        ("n_codes", ct.c_int64),
+        *((n, ct.c_void_p) for n in ("first", "coverage", "target")),
+        *((n, ct.c_void_p) for n in ("codes", "codes_m", "codes_v")),
+        *((n, ct.c_void_p) for n in ("weights", "weights_m", "weights_v")),
+        *((n, ct.c_void_p) for n in ("plane", "code_steps", "row_steps")),
+        *((n, ct.c_int32) for n in ("code_max", "weight_max", "threads")),
+    ]
+
+
+@functools.cache
+def library() -> ct.CDLL | None:
+    """The loaded kernel, or None where it was not built or does not load on this machine."""
+    for suffix in importlib.machinery.EXTENSION_SUFFIXES:
+        path = Path(__file__).with_name("_kernel" + suffix)
+        if path.exists():
+            try:
+                lib = ct.CDLL(str(path))
+            except OSError:
+                return None
+            lib.pxi_train.restype = ct.c_double
+            lib.pxi_train.argtypes = [
+                ct.POINTER(Train), ct.c_void_p, ct.c_int64, ct.c_int64, ct.c_int64, ct.c_void_p,
+                ct.c_void_p,
+            ]  # fmt: skip
+            lib.pxi_forward.restype = None
+            lib.pxi_forward.argtypes = [
+                ct.POINTER(Net), ct.c_void_p, ct.c_void_p, ct.POINTER(Entries), ct.c_int64,
+                ct.c_void_p,
+            ]  # fmt: skip
+            return lib
+    return None
+
+
+def available() -> bool:
+    """Whether the compiled kernel can be used."""
+    return library() is not None
+
+
+def pointer(array: NDArray[Any]) -> int:
+    """Address of a contiguous array, for a `c_void_p` field; the caller keeps the array alive."""
+    if not array.flags.c_contiguous:
+        raise ValueError("the kernel takes contiguous arrays only")
+    return array.ctypes.data
+
+
+def forward(
+    net: Net,
+    codes: NDArray[np.float32],
+    weights: NDArray[np.float32],
+    base: NDArray[np.int32],
+    stride: NDArray[np.int32],
+    fx: NDArray[np.float32],
+    fy: NDArray[np.float32],
+) -> NDArray[np.float32]:
+    """Network outputs [N, channels] of N entries with taps base [N], stride [N], fx, fy [N].
+
+    Args:
+        net: Shape of the network.
+        codes: [rows, dim] dequantized codes.
+        weights: Flat parameters, per layer [out][in] rows and then the biases.
+        base: Row of each entry's upper left code.
+        stride: Distance in rows to the code below.
+        fx: Horizontal fraction in 0..1.
+        fy: Vertical fraction in 0..1.
+    """
+    lib = library()
+    assert lib is not None, "check available() first"
+    out = np.empty((len(base), net.channels), np.float32)
+    entries = Entries(pointer(base), pointer(stride), pointer(fx), pointer(fy))
+    lib.pxi_forward(
+        ct.byref(net), pointer(codes), pointer(weights), ct.byref(entries), len(base), pointer(out)
+    )
+    return out

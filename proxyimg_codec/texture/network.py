@@ -1,0 +1,175 @@
+"""The decoder network: frequency encoding of features and a small ReLU MLP with integer weights."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..entropy import arrays
+from ..errors import FormatError
+
+Floats = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class NetShape:
+    """Sizes of a network.
+
+    Attributes:
+        dim: Features a point, D.
+        octaves: Octaves of the frequency encoding, L (0 = the features themselves).
+        hidden: Width of the hidden layers.
+        depth: Number of hidden layers.
+        channels: Outputs, 3 (colour) or 4 (premultiplied colour and alpha).
+    """
+
+    dim: int
+    octaves: int
+    hidden: int
+    depth: int
+    channels: int
+
+    @property
+    def layers(self) -> list[tuple[int, int]]:
+        """(inputs, outputs) of each linear layer."""
+        sizes = [self.dim * (2 * self.octaves + 1), *[self.hidden] * self.depth, self.channels]
+        return list(pairwise(sizes))
+
+    @property
+    def rows(self) -> int:
+        """Output rows of all layers together; each has a step and a bias."""
+        return sum(o for _, o in self.layers)
+
+    @property
+    def parameters(self) -> int:
+        """Weights and biases."""
+        return sum(i * o + o for i, o in self.layers)
+
+
+@dataclass(frozen=True, eq=False)
+class Network:
+    """A quantized network.
+
+    Attributes:
+        shape: Its sizes.
+        bits: Bits a weight, 2..8.
+        weights: For each layer int8 [out, in].
+        steps: float16 [rows] quantization step of each output row.
+        biases: float16 [rows].
+    """
+
+    shape: NetShape
+    bits: int
+    weights: tuple[NDArray[np.int8], ...]
+    steps: NDArray[np.float16]
+    biases: NDArray[np.float16]
+
+    @cached_property
+    def layers(self) -> list[tuple[Floats, Floats]]:
+        """(weights [out, in], biases [out]) of each layer as float32."""
+        ends = np.cumsum([o for _, o in self.shape.layers])[:-1]
+        steps = np.split(self.steps.astype(np.float32), ends)
+        biases = np.split(self.biases.astype(np.float32), ends)
+        return [
+            (w.astype(np.float32) * s[:, None], b)
+            for w, s, b in zip(self.weights, steps, biases, strict=True)
+        ]
+
+    def __call__(self, features: Floats) -> Floats:
+        """Outputs [N, channels] for features [N, D], not clamped."""
+        x = encode_features(features, self.shape.octaves)
+        for i, (weight, bias) in enumerate(self.layers):
+            x = x @ weight.T
+            x += bias
+            if i + 1 < len(self.layers):
+                np.maximum(x, 0, out=x)
+        return x
+
+
+def encode_features(features: Floats, octaves: int) -> Floats:
+    """Frequency encoding [N, D (2 L + 1)] of features [N, D].
+
+    Order: features, then for each octave k = 0..L-1 sin(2^k pi f) and cos(2^k pi f), each D wide;
+    octaves above the first follow from the double-angle formulas (ProxyImg, frequency encoding
+    of features).
+    """
+    n, d = features.shape
+    out = np.empty((2 * octaves + 1, n, d), np.float32)
+    out[0] = features
+    if octaves:
+        # Reduced to |r| <= 1/2 before multiplying by pi, as exact as float32 allows.
+        turns = np.rint(features)
+        angle = (features - turns) * np.float32(math.pi)
+        sign = (1 - 2 * np.abs(turns % 2)).astype(np.float32)
+        np.multiply(np.sin(angle), sign, out=out[1])
+        np.multiply(np.cos(angle), sign, out=out[2])
+    for k in range(1, octaves):
+        s, c = out[2 * k - 1], out[2 * k]
+        np.multiply(2 * s, c, out=out[2 * k + 1])
+        np.subtract(1, 2 * s * s, out=out[2 * k + 2])
+    return np.concatenate(list(out), axis=1)
+
+
+def pack(network: Network) -> dict[str, Any]:
+    """The fields of NETW."""
+    s = network.shape
+    parts = []
+    for weight in network.weights:
+        values = (weight.astype(np.int64) + (1 << (network.bits - 1)))[None]
+        data = arrays.encode(values, network.bits, np.ones(weight.shape, bool))
+        parts += [len(data).to_bytes(4, "little"), data]
+    return {
+        "dim": s.dim, "octaves": s.octaves, "hidden": s.hidden, "depth": s.depth,
+        "channels": s.channels, "bits": network.bits,
+        "steps": network.steps.astype("<f2").tobytes(),
+        "biases": network.biases.astype("<f2").tobytes(),
+        "weights": b"".join(parts),
+    }  # fmt: skip
+
+
+def unpack(fields: Mapping[str, Any], where: str = "chunk NETW") -> Network:
+    """Inverse of `pack`.
+
+    Raises:
+        FormatError: Corrupt streams, wrong lengths, steps or biases that are not finite.
+    """
+    shape = NetShape(*(fields[k] for k in ("dim", "octaves", "hidden", "depth", "channels")))
+    steps = read_halves(fields["steps"], shape.rows, where, positive=True)
+    biases = read_halves(fields["biases"], shape.rows, where)
+    data, at, weights = fields["weights"], 0, []
+    for inputs, outputs in shape.layers:
+        end = at + 4 + int.from_bytes(data[at : at + 4], "little")
+        if end > len(data):
+            raise FormatError("weights are truncated", where)
+        values = arrays.decode(
+            data[at + 4 : end],
+            (1, outputs, inputs),
+            fields["bits"],
+            np.ones((outputs, inputs), bool),
+        )[0]
+        weights.append((values.astype(np.int16) - (1 << (fields["bits"] - 1))).astype(np.int8))
+        at = end
+    if at != len(data):
+        raise FormatError("bytes follow the weights", where)
+    return Network(shape, fields["bits"], tuple(weights), steps, biases)
+
+
+def read_halves(data: bytes, count: int, where: str, positive: bool = False) -> NDArray[np.float16]:
+    """`count` finite float16 values.
+
+    Raises:
+        FormatError: Wrong length, a value that is not finite, or not positive where it must be.
+    """
+    if len(data) != 2 * count:
+        raise FormatError(f"expected {count} float16 values, found {len(data)} bytes", where)
+    values = np.frombuffer(data, "<f2").astype(np.float16)
+    if not np.isfinite(values).all() or (positive and (values <= 0).any()):
+        raise FormatError("a float16 value is not finite or not positive", where)
+    return values
