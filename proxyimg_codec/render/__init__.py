@@ -1,0 +1,1 @@
+"""Rendering: from layers to pixels at any size and region."""

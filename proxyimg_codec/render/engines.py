@@ -1,0 +1,86 @@
+"""Engines: who runs the decoder network. All give the same colours within rounding.
+
+An engine is a function from (texture, network, taps) to float32 [N, channels]; `numpy` is the
+readable reference that the others are judged by.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+
+import numpy as np
+
+from ..errors import UnsupportedError, UsageError
+from ..texture import kernel
+from ..texture.implicit import ImplicitTexture, Taps
+from ..texture.network import Floats, Network
+
+Engine = Callable[[ImplicitTexture, Network, Taps], Floats]
+
+_CHUNK = 8192
+"""Points at a time: the encoded features then stay in the cache."""
+
+
+def run_numpy(texture: ImplicitTexture, network: Network, taps: Taps) -> Floats:
+    """Plain numpy."""
+    out = np.empty((len(taps.base), network.shape.channels), np.float32)
+    for i in range(0, len(out), _CHUNK):
+        at = slice(i, i + _CHUNK)
+        part = Taps(taps.base[at], taps.fx[at], taps.fy[at], taps.stride)
+        out[at] = network(texture.features(part))
+    return out
+
+
+def run_native(texture: ImplicitTexture, network: Network, taps: Taps) -> Floats:
+    """The compiled kernel."""
+    shape, weights = _flat(network)
+    stride = np.full(len(taps.base), taps.stride, np.int32)
+    return kernel.forward(shape, texture.table, weights, taps.base, stride, taps.fx, taps.fy)
+
+
+@functools.lru_cache(maxsize=64)
+def _flat(network: Network) -> tuple[kernel.Net, Floats]:
+    s = network.shape
+    parts = [a.ravel() for layer in network.layers for a in layer]
+    return kernel.Net(s.dim, s.octaves, s.hidden, s.depth, s.channels), np.concatenate(parts)
+
+
+def run_ort(texture: ImplicitTexture, network: Network, taps: Taps) -> Floats:
+    """ONNX Runtime runs the network on features gathered by numpy."""
+    from ..export.onnx_network import session
+
+    run = session(network)
+    out = np.empty((len(taps.base), network.shape.channels), np.float32)
+    for i in range(0, len(out), 2 * _CHUNK):
+        at = slice(i, i + 2 * _CHUNK)
+        part = Taps(taps.base[at], taps.fx[at], taps.fy[at], taps.stride)
+        out[at] = run(texture.features(part))
+    return out
+
+
+ENGINES: dict[str, Engine] = {"numpy": run_numpy, "native": run_native, "ort": run_ort}
+
+
+def find(name: str) -> Engine:
+    """The engine called `name`; ``auto`` is ``native`` where it was built, else ``numpy``.
+
+    Raises:
+        UsageError: No such engine.
+        UnsupportedError: It is not installed.
+    """
+    if name == "auto":
+        name = "native" if kernel.available() else "numpy"
+    if name not in ENGINES:
+        raise UsageError(f"engine {name!r} is unknown; choose auto, {', '.join(ENGINES)}")
+    if name == "native" and not kernel.available():
+        raise UnsupportedError("engine native: the kernel was not compiled at installation")
+    if name == "ort":
+        try:
+            import onnx  # noqa: F401
+            import onnxruntime  # noqa: F401
+        except ImportError:
+            raise UnsupportedError(
+                "engine ort needs onnxruntime and onnx: pip install 'proxyimg-codec[ort]'"
+            ) from None
+    return ENGINES[name]

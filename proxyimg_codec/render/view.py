@@ -1,0 +1,93 @@
+"""Which output pixels are wanted: size, region, and how samples are averaged when reducing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import UsageError
+
+
+@dataclass(frozen=True)
+class View:
+    """A region of the canvas and the output pixels it becomes.
+
+    Attributes:
+        x: Left edge of the region in canvas pixels.
+        y: Top edge.
+        region_width: Extent in canvas pixels.
+        region_height: Likewise.
+        width: Output columns.
+        height: Output rows.
+    """
+
+    x: int
+    y: int
+    region_width: int
+    region_height: int
+    width: int
+    height: int
+
+    @property
+    def supersampling(self) -> tuple[int, int]:
+        """Samples across and down an output pixel: ceil of the canvas pixels it spans."""
+        return -(-self.region_width // self.width), -(-self.region_height // self.height)
+
+    def columns(self, start: int, stop: int) -> NDArray[np.float64]:
+        """Canvas x of sample columns start..stop-1; samples sit at the centres of their cells."""
+        n = self.width * self.supersampling[0]
+        return _centres(self.x, start, stop, self.region_width / n)
+
+    def rows(self, start: int, stop: int) -> NDArray[np.float64]:
+        """Canvas y of sample rows start..stop-1."""
+        n = self.height * self.supersampling[1]
+        return _centres(self.y, start, stop, self.region_height / n)
+
+
+def _centres(origin: int, start: int, stop: int, pitch: float) -> NDArray[np.float64]:
+    return np.arange(start + 0.5, stop, dtype=np.float64) * pitch + origin
+
+
+def make_view(
+    canvas: tuple[int, int],
+    width: int | None = None,
+    height: int | None = None,
+    scale: float | None = None,
+    region: tuple[int, int, int, int] | None = None,
+) -> View:
+    """The view for a request; what is not given follows from the rest, keeping the aspect.
+
+    Args:
+        canvas: Width and height of the canvas.
+        width: Output columns.
+        height: Output rows.
+        scale: Output pixels a canvas pixel, instead of width and height.
+        region: x, y, width, height in canvas pixels; the whole canvas by default.
+
+    Raises:
+        UsageError: Contradictory, empty or non-finite request, or a region outside the canvas.
+    """
+    x, y, w, h = region or (0, 0, *canvas)
+    if w < 1 or h < 1 or x < 0 or y < 0 or x + w > canvas[0] or y + h > canvas[1]:
+        raise UsageError(
+            f"region {x},{y},{w},{h} is empty or leaves the canvas of {canvas[0]}x{canvas[1]}"
+        )
+    if scale is not None:
+        if width is not None or height is not None:
+            raise UsageError("give either a scale or a width and height")
+        if not (np.isfinite(scale) and scale > 0):
+            raise UsageError(f"scale {scale} is not a positive number")
+        width, height = max(round(w * scale), 1), max(round(h * scale), 1)
+    if width is None and height is None:
+        width, height = w, h
+    elif width is None:
+        assert height is not None
+        width = max(round(w * height / h), 1)
+    elif height is None:
+        height = max(round(h * width / w), 1)
+    assert height is not None
+    if width < 1 or height < 1:
+        raise UsageError(f"output size {width}x{height} is empty")
+    return View(x, y, w, h, width, height)
