@@ -1,0 +1,234 @@
+"""Regions of a picture: masks given by the user, valid stacks of them, order and names."""
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from proxyimg_codec.errors import InputError
+
+MAX_LABELS = 64
+_BACK_NAMES = ("back", "background")
+# Upper ends of the lightness of greys, and of the hue angle in Lab, in degrees.
+_GREYS = ((22, "black"), (40, "dark"), (70, "grey"), (88, "light"), (101, "white"))
+_HUES = ((10, "pink"), (47, "red"), (78, "orange"), (108, "yellow"), (165, "green"),
+         (225, "teal"), (297, "blue"), (330, "purple"), (361, "pink"))  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Region:
+    """One future layer.
+
+    Attributes:
+        name: What the layer will be called.
+        mask: bool [H, W], True where the layer is.
+    """
+
+    name: str
+    mask: NDArray[np.bool_]
+
+
+def load_masks(path: str | Path, width: int, height: int) -> list[Region]:
+    """Read the masks that a user made for a picture of `width` x `height` pixels.
+
+    Args:
+        path: A folder of PNG files, one binary mask each (inside: luminance >= 128, or any
+            non-zero value where that is never reached; with transparency, alpha >= 128), named
+            by the file and put back to front in the natural order of the file names, `back` or
+            `background` first. Or one label PNG: label 0 is the back layer, 1, 2, ... are
+            objects back to front. A grey value is its label; distinct colours are labelled
+            in the order of their packed value 0xRRGGBB.
+        width: Width of the picture in pixels.
+        height: Height of the picture in pixels.
+
+    Returns:
+        Regions back to front. They may overlap, and need not cover the picture: see `resolve`.
+
+    Raises:
+        InputError: Nothing is there, a file is no PNG, has the wrong size, or has more than
+            `MAX_LABELS` labels.
+    """
+    path = Path(path)
+    if not path.is_dir():
+        return _label_regions(_read(path, width, height), path)
+    files = sorted((f for f in path.iterdir() if f.suffix.lower() == ".png"), key=_stack_order)
+    if not files:
+        raise InputError(f"{path}: the mask folder holds no PNG file; put one mask a layer in it")
+    return [Region(f.stem, _binary(_read(f, width, height))) for f in files]
+
+
+def resolve(
+    regions: Sequence[Region],
+    height: int,
+    width: int,
+    support: NDArray[np.bool_] | None = None,
+) -> list[Region]:
+    """Make a valid layer stack: disjoint masks whose union is the picture or its support.
+
+    A pixel in several masks goes to the frontmost. Pixels in none go to the back layer of an
+    opaque picture, which is made if there is none, or to a new rearmost region `rest` of a
+    transparent one. A region named `back` or `background` is moved to the back. Names become
+    unique: `cat`, `cat 2`.
+
+    Args:
+        regions: Masks back to front, each [height, width]; may overlap.
+        height: Height of the picture in pixels.
+        width: Width of the picture in pixels.
+        support: bool [height, width], where the alpha of the picture is above zero; None for
+            an opaque picture.
+
+    Returns:
+        Disjoint, non-empty regions back to front; none if the support is empty.
+
+    Raises:
+        InputError: A mask has the wrong size, or nothing of it remains visible.
+    """
+    for region in regions:
+        _check_size(f'mask "{region.name}"', region.mask, width, height)
+    if support is not None:
+        _check_size("the support of the picture", support, width, height)
+    free = np.ones((height, width), np.bool_) if support is None else support.copy()
+    stack: list[Region] = []
+    for region in sorted(regions[::-1], key=_is_back):
+        stack.insert(0, Region(region.name, region.mask & free))
+        free &= ~region.mask
+    if support is None and stack and _is_back(stack[0]):
+        stack[0] = replace(stack[0], mask=stack[0].mask | free)
+    elif free.any():
+        stack.insert(0, Region("back" if support is None else "rest", free))
+    for region in stack:
+        if not region.mask.any():
+            raise InputError(
+                f'mask "{region.name}" is empty, hidden by the masks in front of it or fully '
+                "outside the visible part; draw it where it can be seen, or leave it out"
+            )
+    names = unique_names(region.name for region in stack)
+    return [replace(r, name=name) for r, name in zip(stack, names, strict=True)]
+
+
+def unique_names(names: Iterable[str]) -> list[str]:
+    """Number repeated names, in their order: `cat`, `cat` become `cat`, `cat 2`."""
+    names = list(names)
+    taken, result = set(names), list[str]()
+    for name in names:
+        unique, number = name, 1
+        while unique in result or (number > 1 and unique in taken):
+            number += 1
+            unique = f"{name} {number}"
+        result.append(unique)
+    return result
+
+
+def nearness(mask: NDArray[np.bool_], salience: float) -> float:
+    """Guess how near a region is; only the order of the values means something.
+
+    Near is salient, low and compact; far holds the frame of the picture, above all its top.
+
+    Args:
+        mask: bool [H, W], not empty.
+        salience: Mean saliency in 0..1.
+    """
+    height, width = mask.shape
+    down = (np.arange(height) + 0.5) / height
+    rows = mask.sum(1)
+    far_frame = 1.5 * mask[0].sum() + 0.5 * mask[-1].sum()
+    far_frame += float((1.5 - down) @ mask[:, [0, -1]].sum(1))
+    box = np.ptp(np.flatnonzero(rows)) * np.ptp(np.flatnonzero(mask.any(0))) / mask.size
+    frame, low = far_frame / (height + width), (rows @ down) / rows.sum()
+    return float(2.5 * salience + 0.5 * low - 0.4 * box - 1.5 * frame)
+
+
+def description(rgb: NDArray[np.uint8], mask: NDArray[np.bool_]) -> str:
+    """Name a region by mean colour and place, such as `red center` or `dark bottom left`.
+
+    Args:
+        rgb: uint8 [H, W, 3], sRGB.
+        mask: bool [H, W], not empty.
+    """
+    height, width = mask.shape
+    y = float(mask.sum(1) @ np.arange(height)) / mask.sum() / height
+    x = float(mask.sum(0) @ np.arange(width)) / mask.sum() / width
+    place = f"{('top', '', 'bottom')[int(y * 3)]} {('left', '', 'right')[int(x * 3)]}".strip()
+    return f"{_colour_word(rgb[mask].mean(0, dtype=np.float32))} {place or 'center'}"
+
+
+def _colour_word(rgb: NDArray[np.float32]) -> str:
+    lab = cv2.cvtColor(rgb.reshape(1, 1, 3) / 255, cv2.COLOR_RGB2LAB)
+    light, a, b = (float(v) for v in lab[0, 0])
+    if np.hypot(a, b) < 10:
+        return next(word for top, word in _GREYS if light <= top)
+    if light < 22:
+        return "dark"
+    hue = float(np.degrees(np.arctan2(b, a))) % 360
+    word = next(word for top, word in _HUES if hue <= top)
+    return "brown" if word == "orange" and light < 50 else word
+
+
+def _is_back(region: Region) -> bool:
+    return region.name.lower() in _BACK_NAMES
+
+
+def _stack_order(file: Path) -> tuple[bool, list[tuple[int, str]], str]:
+    """Natural order: `object 2` before `object 10`; the background before everything."""
+    parts = re.findall(r"\d+|\D+", file.stem.lower())
+    natural = [(int(p), "") if p.isdecimal() else (-1, p) for p in parts]
+    return file.stem.lower() not in _BACK_NAMES, natural, file.name
+
+
+def _read(path: Path, width: int, height: int) -> NDArray[np.uint8]:
+    """Read a PNG as uint8 [H, W] or [H, W, 3 or 4] (BGR, A)."""
+    try:
+        data = np.frombuffer(path.read_bytes(), np.uint8)
+    except OSError as error:
+        raise InputError(f"{path}: cannot read the mask ({error.strerror}); check it") from error
+    is_png = data[:8].tobytes() == b"\x89PNG\r\n\x1a\n"
+    try:
+        image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if is_png else None
+    except cv2.error:
+        image = None
+    if image is None:
+        raise InputError(f"{path}: the mask is not a valid PNG file; save it as PNG")
+    if image.dtype != np.uint8:
+        raise InputError(f"{path}: the mask has 16 bits a channel; save it with 8 bits or fewer")
+    _check_size(f"{path}: the mask", image, width, height)
+    return np.asarray(image, np.uint8)
+
+
+def _check_size(what: str, mask: NDArray[np.generic], width: int, height: int) -> None:
+    if mask.shape[:2] != (height, width):
+        found = f"{mask.shape[1]}x{mask.shape[0]}"
+        raise InputError(f"{what} is {found}, the picture {width}x{height}; make them equal")
+
+
+def _binary(image: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """Inside or outside: by alpha where the file uses it, else by luminance."""
+    if image.ndim == 3 and image.shape[2] == 4 and image[..., 3].min() < 255:
+        return np.asarray(image[..., 3] >= 128)
+    if image.ndim == 3:
+        image = np.asarray(cv2.cvtColor(image[..., :3], cv2.COLOR_BGR2GRAY), np.uint8)
+    # Masks saved as 0 and 1 look black, but mean the same.
+    return image >= (128 if image.max() >= 128 else 1)
+
+
+def _label_regions(image: NDArray[np.uint8], path: Path) -> list[Region]:
+    if image.ndim == 3:
+        blue, green, red = (image[..., c].astype(np.int32) for c in range(3))
+        grey = bool(((blue == green) & (green == red)).all())
+        image_labels = blue if grey else red << 16 | green << 8 | blue
+    else:
+        grey, image_labels = True, image.astype(np.int32)
+    values = np.unique(image_labels)
+    if len(values) > MAX_LABELS:
+        raise InputError(
+            f"{path}: the label picture has {len(values)} different labels, more than "
+            f"{MAX_LABELS}; save it without smoothing, one flat colour a layer"
+        )
+    labels = values if grey else np.arange(len(values))
+    return [
+        Region("back" if label == 0 else f"object {label}", image_labels == value)
+        for label, value in zip(labels, values, strict=True)
+    ]
