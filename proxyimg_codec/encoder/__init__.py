@@ -1,0 +1,1 @@
+"""The encoder: decompose, fit boundaries and textures, quantize, pack."""

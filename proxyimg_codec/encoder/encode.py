@@ -1,0 +1,195 @@
+"""From a picture to an `Image`: layers, boundaries, fitted and quantized textures."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import __version__
+from ..errors import InputError, UsageError
+from ..image import Image, Layer, Layers
+from ..texture.implicit import ImplicitTexture
+from ..texture.network import Floats, NetShape, Network
+from . import fit
+from .layers import plan_layers
+from .masks import Region
+from .problem import Problem, build
+from .settings import Settings
+
+
+class Progress(Protocol):
+    """Told what the encoder does."""
+
+    def __call__(self, stage: str, done: int, total: int) -> None:
+        """`done` of `total` units of `stage` are finished."""
+
+
+def encode(
+    pixels: NDArray[Any],
+    settings: Settings | None = None,
+    *,
+    masks: Sequence[Region] | None = None,
+    blocks: Mapping[str, bytes] | None = None,
+    progress: Progress | None = None,
+    **options: Any,
+) -> Image:
+    """Encodes a picture.
+
+    Args:
+        pixels: [H, W] or [H, W, C] with C = 1 grey, 2 grey and alpha, 3 RGB, 4 RGB and straight
+            alpha; uint8, uint16, or floating point in 0..1.
+        settings: What is asked for; `options` are fields of `Settings` given by name instead.
+        masks: User-given layers back to front; the built-in decomposition otherwise.
+        blocks: Metadata ``icc``, ``exif``, ``xmp`` to carry.
+        progress: Called as work goes on.
+        options: Fields of `Settings`, such as ``quality=70``.
+
+    Returns:
+        The picture as it will be decoded.
+
+    Raises:
+        InputError: The array cannot be a picture, or a mask does not fit it.
+        UsageError: A setting is out of range.
+        UnsupportedError: Something needed is not installed.
+    """
+    settings = settings or Settings()
+    if options:
+        try:
+            settings = replace(settings, **options)
+        except TypeError as error:
+            raise UsageError(f"encode: {error}") from None
+    report = progress or (lambda stage, done, total: None)
+    picture, depth = to_float(pixels)
+    report("layers", 0, 1)
+    plan = plan_layers(picture, settings, masks)
+    report("layers", 1, 1)
+
+    height, width = picture.shape[:2]
+    shape = settings.network(height * width, plan.channels)
+    premultiplied = picture.copy()
+    premultiplied[..., :3] *= picture[..., 3:]
+    outlines = [layer.boundary for layer in plan.layers]
+    problem = build(premultiplied, outlines, shape, settings.spacing)
+    state, stored = _fit(problem, settings, report)
+    network, textures = assemble(problem, state, stored, settings)
+    info = {
+        "encoder": f"proxyimg-codec {__version__}",
+        "settings": json.dumps(settings.record(), sort_keys=True),
+        "areas": list(problem.areas),
+    }
+    layers = [
+        Layer(layer.name, plane.box, layer.boundary, texture)
+        for layer, plane, texture in zip(plan.layers, problem.planes, textures, strict=True)
+    ]
+    return Image(
+        width, height, plan.channels, plan.opaque, depth, Layers(layers), (network,),
+        dict(blocks or {}), info,
+    )  # fmt: skip
+
+
+def to_float(pixels: NDArray[Any]) -> tuple[Floats, int]:
+    """A picture as float32 [H, W, 4] with straight alpha in 0..1, and its depth, 8 or 16.
+
+    Raises:
+        InputError: Wrong shape or type, empty, not finite, or outside 0..1.
+    """
+    if pixels.ndim == 2:
+        pixels = pixels[..., None]
+    if pixels.ndim != 3 or not 1 <= pixels.shape[2] <= 4 or pixels.size == 0:
+        raise InputError(
+            f"a picture must be [H, W] or [H, W, 1..4] and not empty, not {pixels.shape}"
+        )
+    if pixels.dtype in (np.uint8, np.uint16):
+        depth = 8 * pixels.dtype.itemsize
+        values = pixels.astype(np.float32) / np.float32(np.iinfo(pixels.dtype).max)
+    elif pixels.dtype.kind == "f":
+        depth, values = 16, pixels.astype(np.float32)
+        if not np.isfinite(values).all():
+            raise InputError("the picture has NaN or infinite samples; replace them first")
+        if values.min() < 0 or values.max() > 1:
+            raise InputError("floating-point samples must lie in 0..1; scale or clip them first")
+    else:
+        raise InputError(
+            f"samples of type {pixels.dtype} are not supported; use uint8, uint16 or float"
+        )
+    channels = values.shape[2]
+    out = np.ones((*values.shape[:2], 4), np.float32)
+    out[..., :3] = values[..., :3] if channels > 2 else values[..., :1]
+    if channels in (2, 4):
+        out[..., 3] = values[..., -1]
+    return out, depth
+
+
+def _fit(
+    problem: Problem, settings: Settings, report: Callable[[str, int, int], None]
+) -> tuple[fit.State, list[NDArray[np.bool_]]]:
+    """Fitted state, and the mask of stored codes of each layer."""
+    if (problem.target == problem.target[0]).all():
+        return constant(problem, settings), problem.stored()
+    done = 0
+
+    def step(count: int) -> None:
+        nonlocal done
+        done += count
+        report("texture", done, settings.steps)
+
+    state = fit.fit(
+        problem, settings.steps, settings.bits, settings.net_bits, settings.seed,
+        settings.device, settings.jobs, step,
+    )  # fmt: skip
+    stored = problem.stored()
+    if settings.background == "complete" and problem.planes[0].box[:2] == (0, 0):
+        from .background import complete
+
+        stored[0] = complete(problem, state, stored[0], settings)
+    return state, stored
+
+
+def constant(problem: Problem, settings: Settings) -> fit.State:
+    """The state of a picture of one colour: the output bias says it all."""
+    state = fit.initial(problem, settings.seed)
+    state.codes[:] = 0
+    state.weights[:] = 0
+    fit.rows_of(problem.shape, state.weights)[-1][1][:] = problem.target[0]
+    state.code_bits, state.net_bits = settings.bits, settings.net_bits
+    return state
+
+
+def assemble(
+    problem: Problem, state: fit.State, stored: list[NDArray[np.bool_]], settings: Settings
+) -> tuple[Network, list[ImplicitTexture]]:
+    """The quantized network and textures of a fitted state."""
+    shape: NetShape = problem.shape
+    rows = fit.rows_of(shape, state.weights)
+    ends = np.cumsum([o for _, o in shape.layers])[:-1]
+    steps = np.split(state.row_steps, ends)
+    network = Network(
+        shape,
+        settings.net_bits,
+        tuple(
+            fit.quantize(w, s[:, None], settings.net_bits)
+            for (w, _), s in zip(rows, steps, strict=True)
+        ),
+        state.row_steps.astype(np.float16),
+        np.concatenate([b for _, b in rows]).astype(np.float16),
+    )
+    textures = []
+    for k, plane in enumerate(problem.planes):
+        values = state.codes[plane.start : plane.start + plane.size]
+        codes = fit.quantize(values, state.code_steps[k], settings.bits)
+        codes = np.where(stored[k].reshape(-1, 1), codes, np.int8(0)).T
+        textures.append(
+            ImplicitTexture(
+                0,
+                settings.bits,
+                state.code_steps[k].astype(np.float16),
+                np.ascontiguousarray(codes).reshape(shape.dim, plane.rows, plane.columns),
+                stored[k],
+            )
+        )
+    return network, textures

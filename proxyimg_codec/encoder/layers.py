@@ -1,0 +1,113 @@
+"""From a picture to named layers with boundaries, back to front."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..geometry.boundary import Boundary
+from ..texture.network import Floats
+from .contours import fit_paths
+from .masks import Region, resolve
+from .segment import segment
+from .settings import Settings
+
+UNIT = 2
+"""Boundaries are fitted in quarters of a pixel."""
+
+OVERLAP = 3
+"""Pixels that a layer reaches under those in front of it, so that nothing shines through."""
+
+SOFT_SHARE = 0.002
+"""Share of half-transparent pixels away from outlines above which textures give alpha."""
+
+FINE_PIXELS = 1 << 20
+"""Up to this size outlines of transparent pictures are traced at a quarter of a pixel."""
+
+
+@dataclass(frozen=True, eq=False)
+class LayerPlan:
+    """A layer to be: its name and boundary (None = the whole canvas)."""
+
+    name: str
+    boundary: Boundary | None
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Layers back to front, the channels of their textures, and whether they cover the canvas."""
+
+    layers: tuple[LayerPlan, ...]
+    channels: int
+    opaque: bool
+
+
+def plan_layers(picture: Floats, settings: Settings, masks: Sequence[Region] | None) -> Plan:
+    """Decomposes a picture [H, W, 4] with straight alpha.
+
+    Raises:
+        InputError: A mask does not fit the picture.
+    """
+    height, width = picture.shape[:2]
+    alpha = picture[..., 3]
+    opaque = bool((alpha == 1).all())
+    soft = not opaque and _is_soft(alpha)
+    support = None if opaque else _dilate(alpha > 0, 2) if soft else alpha >= 0.5
+    if support is not None and not support.any():
+        return Plan((LayerPlan("empty", None),), 4, False)
+    if masks is not None:
+        regions = resolve(masks, height, width, support)
+    elif settings.max_layers == 1:
+        whole = np.ones((height, width), bool) if support is None else support
+        regions = [Region("picture", whole)]
+    else:
+        rgb = np.rint(picture[..., :3] * 255).astype(np.uint8)
+        regions = segment(rgb, settings.max_layers, support)
+    outline = alpha if not opaque and not soft and height * width <= FINE_PIXELS else None
+    layers = []
+    for k, region in enumerate(regions):
+        if opaque and k == 0:
+            layers.append(LayerPlan(region.name, None))
+            continue
+        front = np.zeros((height, width), bool)
+        for other in regions[k + 1 :]:
+            front |= other.mask
+        mask = region.mask | (_dilate(region.mask, OVERLAP) & front)
+        layers.append(LayerPlan(region.name, _boundary(mask, outline, settings)))
+    return Plan(tuple(layers), 4 if soft else 3, opaque)
+
+
+def _boundary(mask: NDArray[np.bool_], outline: Floats | None, settings: Settings) -> Boundary:
+    """Fits a mask; with `outline`, an alpha plane, at the resolution of the stored units."""
+    fit_method: Callable[..., list[NDArray[np.int64]]] = fit_paths
+    if settings.boundary == "chamfer":
+        from .chamfer import fit_paths_chamfer
+
+        fit_method = fit_paths_chamfer
+    if outline is None:
+        return Boundary(UNIT, tuple(fit_method(mask, step=2.0**-UNIT)))
+    size = (mask.shape[1] << UNIT, mask.shape[0] << UNIT)
+    inside = cv2.resize(outline, size, interpolation=cv2.INTER_LINEAR) >= 0.5
+    # One pixel of slack: alpha >= 0.5 between pixels may lie just outside the pixel mask.
+    near = cv2.resize(_dilate(mask, 1).astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)
+    fine = inside & (near > 0)
+    if not fine.any():
+        fine = cv2.resize(mask.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
+    return Boundary(UNIT, tuple(fit_method(fine, step=1.0)))
+
+
+def _dilate(mask: NDArray[np.bool_], radius: int) -> NDArray[np.bool_]:
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1))
+    return cv2.dilate(mask.astype(np.uint8), kernel) > 0
+
+
+def _is_soft(alpha: Floats) -> bool:
+    """Whether alpha is more than the smooth rim of an outline."""
+    inside = alpha >= 0.5
+    rim = _dilate(inside, 2) & _dilate(~inside, 2)
+    soft = (alpha > 0.03) & (alpha < 0.97) & ~rim
+    return bool(soft.sum() > SOFT_SHARE * (alpha > 0).sum())

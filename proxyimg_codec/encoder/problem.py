@@ -1,0 +1,146 @@
+"""The fitting problem: which codes, with which weights, make each visible pixel."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..geometry import coverage as cover
+from ..geometry.boundary import Boundary
+from ..texture.implicit import Box, taps
+from ..texture.network import Floats, NetShape
+
+
+@dataclass(frozen=True, eq=False)
+class Plane:
+    """Where a layer's codes lie: its box, columns and rows, and its first row in the table."""
+
+    box: Box
+    columns: int
+    rows: int
+    start: int
+
+    @property
+    def size(self) -> int:
+        """Number of code positions."""
+        return self.columns * self.rows
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Pixels, their entries (one per layer seen in the pixel, front to back), and targets.
+
+    Attributes:
+        shape: The network.
+        planes: One a layer, back to front.
+        first: int32 [pixels + 1] range of entries of each pixel.
+        base: int32 [entries] table row of the upper left code.
+        stride: int32 [entries] table rows to the code below.
+        fx: float32 [entries] horizontal fraction.
+        fy: float32 [entries] vertical fraction.
+        coverage: float32 [entries] coverage of the layer, 0..1.
+        target: float32 [pixels, channels], premultiplied.
+        areas: Visible pixels of each layer.
+    """
+
+    shape: NetShape
+    planes: tuple[Plane, ...]
+    first: NDArray[np.int32]
+    base: NDArray[np.int32]
+    stride: NDArray[np.int32]
+    fx: Floats
+    fy: Floats
+    coverage: Floats
+    target: Floats
+    areas: tuple[int, ...]
+
+    @property
+    def codes(self) -> int:
+        """Rows of the table of codes."""
+        return self.planes[-1].start + self.planes[-1].size
+
+    @property
+    def pixels(self) -> int:
+        """Number of pixels that any layer covers."""
+        return len(self.target)
+
+    def stored(self) -> list[NDArray[np.bool_]]:
+        """For each layer bool [rows, columns]: the codes that a visible pixel touches."""
+        touched = np.zeros(self.codes, bool)
+        for offset in (0, 1):
+            touched[self.base + offset] = True
+            touched[self.base + self.stride + offset] = True
+        return [touched[p.start : p.start + p.size].reshape(p.rows, p.columns) for p in self.planes]
+
+
+def plane_for(
+    boundary: Boundary | None, width: int, height: int, spacing: float, start: int
+) -> Plane:
+    """The plane of a layer: its box is the boundary's, within the canvas."""
+    x0, y0, x1, y1 = (0, 0, width, height) if boundary is None else boundary.bounds()
+    x0, y0 = min(max(x0, 0), width - 1), min(max(y0, 0), height - 1)
+    x1, y1 = max(min(x1, width), x0 + 1), max(min(y1, height), y0 + 1)
+    columns, rows = (max(round((b - a) / spacing) + 1, 2) for a, b in ((x0, x1), (y0, y1)))
+    return Plane((x0, y0, x1 - x0, y1 - y0), columns, rows, start)
+
+
+def build(
+    picture: Floats,
+    boundaries: Sequence[Boundary | None],
+    shape: NetShape,
+    spacing: float,
+) -> Problem:
+    """The problem of a picture [H, W, 4] (premultiplied) with layers back to front."""
+    height, width = picture.shape[:2]
+    planes: list[Plane] = []
+    for boundary in boundaries:
+        start = planes[-1].start + planes[-1].size if planes else 0
+        planes.append(plane_for(boundary, width, height, spacing, start))
+
+    clear = np.ones(height * width, bool)
+    seen: list[NDArray[np.int64]] = []
+    parts: list[tuple[NDArray[Any], ...]] = []
+    areas = [0] * len(planes)
+    for k in range(len(planes) - 1, -1, -1):
+        covered = _coverage(boundaries[k], width, height)
+        at = np.flatnonzero((covered > 0) & clear)
+        areas[k] = int((covered[at].astype(np.int64)).sum() / cover.FULL + 0.5)
+        plane = planes[k]
+        t = taps(at % width + 0.5, at // width + 0.5, plane.box, plane.columns, plane.rows)
+        seen.append(at)
+        parts.append(
+            (
+                t.base + np.int32(plane.start),
+                np.full(len(at), t.stride, np.int32),
+                t.fx,
+                t.fy,
+                covered[at].astype(np.float32) / cover.FULL,
+            )
+        )
+        # With alpha, what lies behind may show through; the picture does not say how much.
+        clear &= covered < cover.FULL
+    pixel = np.concatenate(seen)
+    order = np.argsort(pixel, kind="stable")
+    ids, counts = np.unique(pixel, return_counts=True)
+    base, stride, fx, fy, coverage = (np.concatenate(p)[order] for p in zip(*parts, strict=True))
+    target = picture.reshape(-1, 4)[ids, : shape.channels].astype(np.float32)
+    first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+    return Problem(
+        shape, tuple(planes), first, base, stride, fx, fy, coverage,
+        np.ascontiguousarray(target), tuple(areas),
+    )  # fmt: skip
+
+
+def _coverage(boundary: Boundary | None, width: int, height: int) -> NDArray[np.int32]:
+    if boundary is None:
+        return np.full(width * height, cover.FULL, np.int32)
+    paths = [
+        np.stack([cover.to_output(p[:, i], boundary.unit, 0, size, size) for i, size in axes], 1)
+        for axes in [((0, width), (1, height))]
+        for p in boundary.paths
+    ]
+    return cover.coverage(paths, 0, 0, width, height).ravel()

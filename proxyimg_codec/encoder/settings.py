@@ -1,0 +1,98 @@
+"""Encoder settings: quality and effort as data."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from ..errors import UsageError
+from ..texture.network import NetShape
+
+PRESETS = {"fast": 2, "default": 5, "best": 8}
+"""Effort of each preset."""
+
+EFFORT_STEPS = (400, 800, 1600, 3000, 6000, 10000, 16000, 26000, 40000)
+"""Optimizer steps at effort 1..9; half of them with quantization in the loop."""
+
+SEGMENTERS = ("auto", "none")
+BOUNDARIES = ("lsq", "chamfer")
+BACKGROUNDS = ("diffuse", "complete")
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What an encode is asked for.
+
+    Attributes:
+        quality: 0..100; sets density of codes, bits and width of the network.
+        effort: 1..9; sets the number of optimizer steps.
+        max_layers: Most layers of the built-in decomposition; 1 = none.
+        feature_bits: Bits a code, 2..8; None = from quality.
+        net_bits: Bits a weight, 2..8.
+        boundary: ``lsq`` (least squares) or ``chamfer`` (the paper's fit).
+        background: ``diffuse`` (hidden codes of the back layer are filled when decoding) or
+            ``complete`` (they are optimized for smoothness and stored).
+        seed: Seed of everything random.
+        jobs: Threads, at least 1.
+        device: ``cpu`` or ``cuda``.
+    """
+
+    quality: float = 50.0
+    effort: int = 5
+    max_layers: int = 4
+    feature_bits: int | None = None
+    net_bits: int = 8
+    boundary: str = "lsq"
+    background: str = "diffuse"
+    seed: int = 0
+    jobs: int = 2
+    device: str = "cpu"
+
+    def __post_init__(self) -> None:
+        checks = [
+            (math.isfinite(self.quality) and 0 <= self.quality <= 100, "quality", "0..100"),
+            (1 <= self.effort <= 9, "effort", "1..9"),
+            (1 <= self.max_layers <= 64, "max_layers", "1..64"),
+            (self.feature_bits is None or 2 <= self.feature_bits <= 8, "feature_bits", "2..8"),
+            (2 <= self.net_bits <= 8, "net_bits", "2..8"),
+            (self.boundary in BOUNDARIES, "boundary", " or ".join(BOUNDARIES)),
+            (self.background in BACKGROUNDS, "background", " or ".join(BACKGROUNDS)),
+            (0 <= self.seed < 1 << 32, "seed", "0..2^32-1"),
+            (self.jobs >= 1, "jobs", "at least 1"),
+            (self.device in ("cpu", "cuda"), "device", "cpu or cuda"),
+        ]
+        for good, name, allowed in checks:
+            if not good:
+                raise UsageError(f"{name} is {getattr(self, name)}, but must be {allowed}")
+
+    @property
+    def steps(self) -> int:
+        """Optimizer steps."""
+        return EFFORT_STEPS[self.effort - 1]
+
+    @property
+    def bits(self) -> int:
+        """Bits a code."""
+        if self.feature_bits is not None:
+            return self.feature_bits
+        return 3 if self.quality < 15 else 4 if self.quality < 80 else 5
+
+    @property
+    def spacing(self) -> float:
+        """Canvas pixels between codes: 14 at quality 0, 6.2 at 50, 2.75 at 100."""
+        return float(14.0 * (2.75 / 14.0) ** (self.quality / 100))
+
+    def network(self, pixels: int, channels: int) -> NetShape:
+        """Shape of the network for a picture of so many visible pixels.
+
+        Width grows with quality, and shrinks with small pictures, where the weights would
+        outweigh the codes.
+        """
+        width = 24 + 16 * self.quality / 100
+        width *= min(1.0, (pixels / 65536) ** 0.25)
+        return NetShape(8, 5, max(4 * round(width / 4), 8), 2, channels)
+
+    def record(self) -> dict[str, Any]:
+        """What is written into the file about its making; nothing of the machine."""
+        return {k: v for k, v in asdict(self).items() if k not in ("jobs", "device")}
