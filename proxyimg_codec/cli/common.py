@@ -1,0 +1,93 @@
+"""What the tools share: exit codes, refusal to overwrite, progress."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from .._version import __version__
+from ..errors import InputError, PxiError, UsageError
+
+EXIT_CODES = """exit codes:
+  0 ok, 2 usage, 3 input or output, 4 invalid file, 5 unsupported, 6 limit exceeded, 130 interrupted
+"""
+
+
+def parser(prog: str, description: str) -> argparse.ArgumentParser:
+    """An argument parser in the style of all tools."""
+    p = argparse.ArgumentParser(
+        prog, description=description, epilog=EXIT_CODES,
+        formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False,
+    )  # fmt: skip
+    p.add_argument("--version", action="version", version=f"{prog} {__version__}")
+    return p
+
+
+def run(prog: str, work: Callable[[], None]) -> int:
+    """Runs a tool; errors become one line on stderr and an exit code."""
+    try:
+        work()
+        sys.stdout.flush()
+    except PxiError as error:
+        print(f"{prog}: {error}", file=sys.stderr)
+        return error.exit_code
+    except KeyboardInterrupt:
+        print(f"{prog}: interrupted, nothing written", file=sys.stderr)
+        return 130
+    except MemoryError:
+        print(f"{prog}: not enough memory; ask for a smaller picture or region", file=sys.stderr)
+        return 6
+    except BrokenPipeError:
+        # The reader of our output has gone; there is nobody left to tell.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        return 3
+    return 0
+
+
+def check_target(path: str, force: bool, source: str | None = None) -> None:
+    """Refuses a target that exists, is the source, or whose folder does not exist.
+
+    Raises:
+        UsageError: Input and output are the same file.
+        InputError: The file exists and `force` is off, or its folder is missing.
+    """
+    if path == "-":
+        if sys.stdout.isatty():
+            raise UsageError("refusing to write binary data to a terminal; redirect it")
+        return
+    target = Path(path)
+    if source not in (None, "-") and target.exists() and target.samefile(str(source)):
+        raise UsageError(f"{path}: input and output are the same file")
+    if target.is_dir():
+        raise InputError(f"{path}: is a folder")
+    if not target.parent.is_dir():
+        raise InputError(f"{path}: its folder does not exist")
+    if target.exists() and not force:
+        raise InputError(f"{path}: exists already; use --force to replace it")
+
+
+class Bar:
+    """A progress bar on a terminal; silent in a pipe, with `quiet`, or without tqdm."""
+
+    def __init__(self, total: int, label: str, quiet: bool) -> None:
+        self._bar: Any = None
+        if not quiet and sys.stderr.isatty():
+            try:
+                from tqdm import tqdm
+            except ImportError:
+                return
+            self._bar = tqdm(total=total, desc=label, leave=False, unit_scale=True, file=sys.stderr)
+
+    def advance(self, count: int) -> None:
+        """Moves the bar on."""
+        if self._bar is not None:
+            self._bar.update(count)
+
+    def close(self) -> None:
+        """Removes the bar."""
+        if self._bar is not None:
+            self._bar.close()

@@ -1,0 +1,159 @@
+"""pxi-decode: a .pxi file becomes a picture of any size, or an ONNX model."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from .common import Bar, check_target, parser, run
+
+
+def arguments() -> argparse.ArgumentParser:
+    """The command line."""
+    p = parser("pxi-decode", "Render a .pxi file at any size and region.")
+    p.add_argument("input", metavar="IN", help=".pxi file, or - for standard input")
+    p.add_argument("output", metavar="OUT", nargs="?", help="picture file, type by suffix; - writes "
+                   "PNG to standard output; IN with the suffix .png by default")  # fmt: skip
+    add = p.add_argument
+    add("--scale", type=float, help="output pixels a canvas pixel")
+    add("--width", type=int, help="output width; the height follows")
+    add("--height", type=int, help="output height; the width follows")
+    add("--region", metavar="X,Y,W,H", help="part of the canvas, in its pixels")
+    add("--layer", action="append", metavar="NAME|INDEX", help="draw only this layer; repeatable")
+    add("--no-background", action="store_true", help="leave out the back layer")
+    add("--bit-depth", type=int, choices=[8, 16, 32], help="bits a sample, 32 = floating point; "
+        "8 by default")  # fmt: skip
+    add("--engine", choices=["auto", "numpy", "native", "ort"], default="auto",
+        help="who runs the networks; auto is the fastest that is built in")  # fmt: skip
+    add("--export-onnx", metavar="FILE", help="write the decoder network as ONNX")
+    add("-f", "--force", action="store_true", help="replace files that exist")
+    add("--quiet", action="store_true", help="print nothing but errors")
+    return p
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Entry point; returns the exit code."""
+    args = arguments().parse_args(argv)
+    return run("pxi-decode", lambda: decode_file(args))
+
+
+def decode_file(args: argparse.Namespace) -> None:
+    """Does what the command line asks for."""
+    rendering = args.output is not None or args.export_onnx is None
+    output = target(args) if rendering else ""
+    if rendering:
+        check_target(output, args.force, args.input)
+    else:
+        refuse_render_flags(args)
+    if args.export_onnx:
+        check_target(args.export_onnx, args.force, args.input)
+
+    from ..image import open_image
+
+    started = time.perf_counter()
+    image = open_image(args.input)
+    if args.export_onnx:
+        export(image, args)
+    if rendering:
+        render(image, output, args)
+        if not args.quiet:
+            print(f"{output}: {time.perf_counter() - started:.2f} s", file=sys.stderr)
+
+
+def refuse_render_flags(args: argparse.Namespace) -> None:
+    """A flag that would do nothing is an error.
+
+    Raises:
+        UsageError: A rendering flag was given, but nothing is rendered.
+    """
+    from ..errors import UsageError
+
+    flags = ("scale", "width", "height", "region", "layer", "no_background", "bit_depth")
+    for name in flags:
+        if getattr(args, name):
+            raise UsageError(f"--{name.replace('_', '-')} needs an output picture")
+    if args.engine != "auto":
+        raise UsageError("--engine needs an output picture")
+
+
+def target(args: argparse.Namespace) -> str:
+    """Where the picture goes."""
+    if args.output:
+        return str(args.output)
+    return "-" if args.input == "-" else str(Path(args.input).with_suffix(".png"))
+
+
+def export(image: Any, args: argparse.Namespace) -> None:
+    """Writes the network of the back layer, or of the one layer that was asked for."""
+    from ..errors import UsageError
+    from ..export.onnx_network import build
+    from ..files import write_atomically
+
+    indices = {layer.texture.network for layer in selected(image, args.layer)}
+    if len(indices) > 1:
+        raise UsageError("the layers have several networks; choose one layer with --layer")
+    model = build(image.networks[indices.pop()])
+    write_atomically(args.export_onnx, model.SerializeToString())
+    if not args.quiet:
+        print(f"{args.export_onnx}: ONNX opset {model.opset_import[0].version}", file=sys.stderr)
+
+
+def selected(image: Any, names: list[str] | None) -> list[Any]:
+    """The layers of --layer, all by default."""
+    return [image.layers[key(n)] for n in names] if names else list(image.layers)
+
+
+def key(name: str) -> str | int:
+    """A layer's address: digits are an index, everything else a name."""
+    return int(name) if name.removeprefix("-").isdecimal() else name
+
+
+def render(image: Any, output: str, args: argparse.Namespace) -> None:
+    """Renders and writes the picture."""
+    import numpy as np
+
+    from ..pictures import write
+    from ..render.view import make_view
+
+    region = parse_region(args.region)
+    view = make_view((image.width, image.height), args.width, args.height, args.scale, region)
+    bar = Bar(view.width * view.height, "rendering", args.quiet)
+    dtype = {8: np.uint8, 16: np.uint16, 32: np.float32}[args.bit_depth or 8]
+    try:
+        pixels = image.render(
+            width=view.width,
+            height=view.height,
+            region=region,
+            layers=[key(n) for n in args.layer] if args.layer else None,
+            background=not args.no_background,
+            dtype=dtype,
+            engine=args.engine,
+            progress=bar.advance,
+        )
+    finally:
+        bar.close()
+    write(output, pixels, image.blocks, ".png" if output == "-" else None)
+
+
+def parse_region(text: str | None) -> tuple[int, int, int, int] | None:
+    """X,Y,W,H as integers.
+
+    Raises:
+        UsageError: Not four integers.
+    """
+    from ..errors import UsageError
+
+    if text is None:
+        return None
+    try:
+        x, y, w, h = (int(part) for part in text.split(","))
+    except ValueError:
+        raise UsageError(f"--region {text}: must be X,Y,W,H in whole canvas pixels") from None
+    return x, y, w, h
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,158 @@
+"""pxi-encode: a picture becomes a .pxi file."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import time
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from .common import Bar, check_target, parser, run
+
+PRESET_NAMES = ("fast", "default", "best")
+
+
+def arguments() -> argparse.ArgumentParser:
+    """The command line."""
+    p = parser(
+        "pxi-encode", "Encode a picture as .pxi: layers, Bézier boundaries, fitted textures."
+    )
+    p.add_argument("input", metavar="IN", help="picture file, or - for standard input")
+    p.add_argument("output", metavar="OUT", nargs="?", help=".pxi file, - for standard output; "
+                   "IN with the suffix .pxi by default")  # fmt: skip
+    add = p.add_argument
+    add("-q", "--quality", type=float, default=50, metavar="0-100", help="default 50")
+    add("-e", "--effort", type=int, metavar="1-9", help="how long to optimize; default 5")
+    add("--preset", choices=PRESET_NAMES, default="default",
+        help="effort 2, 5 or 8; --effort goes before it")  # fmt: skip
+    add("--masks", metavar="PATH", help="folder of mask PNGs, or one label PNG: the layers to make")
+    add("--max-layers", type=int, default=4, metavar="N", help="most layers found; default 4")
+    add("--layers", type=int, choices=[1], help="1: one layer, no decomposition")
+    add("--boundary", choices=["lsq", "chamfer"], default="lsq", help="boundary fit: least squares "
+        "(default), or the slower adaptive Chamfer fit of the paper")  # fmt: skip
+    add("--background", choices=["diffuse", "complete"], default="diffuse", help="hidden parts of "
+        "the back layer: filled when decoding (default), or optimized and stored")  # fmt: skip
+    add("--feature-bits", type=int, metavar="2-8", help="bits a code; from quality by default")
+    add("--net-bits", type=int, default=8, metavar="2-8", help="bits a network weight; default 8")
+    add("--seed", type=int, default=0, help="seed of everything random; default 0")
+    add("-j", "--jobs", type=int, metavar="N", help="threads; all cores by default")
+    add("--device", choices=["cpu", "cuda"], default="cpu", help="where to fit; default cpu")
+    add("--strip", action="store_true", help="leave out ICC, EXIF and XMP")
+    add("-f", "--force", action="store_true", help="replace OUT if it exists")
+    add("--quiet", action="store_true", help="print nothing but errors")
+    add("--json", action="store_true", help="print the report as JSON on standard output")
+    return p
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Entry point; returns the exit code."""
+    args = arguments().parse_args(argv)
+    return run("pxi-encode", lambda: encode_file(args))
+
+
+def encode_file(args: argparse.Namespace) -> None:
+    """Does what the command line asks for."""
+    from ..errors import UsageError
+
+    output = target(args)
+    if output == "-" and args.json:
+        raise UsageError("--json and a picture cannot both go to standard output")
+    check_target(output, args.force, args.input)
+    settings = settings_from(args)
+
+    from ..pictures import read
+
+    started, cpu = time.perf_counter(), time.process_time()
+    picture = read(args.input)
+
+    from ..encoder.encode import encode
+    from ..encoder.masks import load_masks
+    from ..quality import psnr
+
+    height, width = picture.pixels.shape[:2]
+    masks = load_masks(args.masks, width, height) if args.masks else None
+    bar = Bar(settings.steps, "fitting", args.quiet or args.json)
+    seen = 0
+
+    def progress(stage: str, done: int, total: int) -> None:
+        nonlocal seen
+        if stage == "texture":
+            bar.advance(done - seen)
+            seen = done
+
+    try:
+        image = encode(
+            picture.pixels,
+            settings,
+            masks=masks,
+            blocks={} if args.strip else picture.blocks,
+            progress=progress,
+        )
+    finally:
+        bar.close()
+    data = image.to_bytes()
+
+    from ..files import write_atomically
+
+    quality = psnr(picture.pixels, image)
+    write_atomically(output, data)
+    report = {
+        "output": output,
+        "width": width,
+        "height": height,
+        "bytes": len(data),
+        "bpp": round(8 * len(data) / (width * height), 4),
+        "psnr": None if quality is None else round(quality, 3),
+        "layers": [layer.name for layer in image.layers],
+        "seconds": round(time.perf_counter() - started, 2),
+        "cpu_seconds": round(time.process_time() - cpu, 2),
+    }
+    if args.json:
+        print(json.dumps(report))
+    elif not args.quiet:
+        print(describe(report), file=sys.stderr)
+
+
+def target(args: argparse.Namespace) -> str:
+    """Where the output goes."""
+    if args.output:
+        return str(args.output)
+    return "-" if args.input == "-" else str(Path(args.input).with_suffix(".pxi"))
+
+
+def settings_from(args: argparse.Namespace) -> Any:
+    """`Settings` of a command line.
+
+    Raises:
+        UsageError: A value is out of range, or flags contradict each other.
+    """
+    from ..encoder.settings import PRESETS, Settings
+    from ..errors import UsageError
+
+    if args.layers and args.masks:
+        raise UsageError("--layers 1 and --masks contradict each other")
+    values = {k: v for k, v in vars(args).items() if k in {f.name for f in fields(Settings)}}
+    values["effort"] = PRESETS[args.preset] if args.effort is None else args.effort
+    values["jobs"] = (os.cpu_count() or 1) if args.jobs is None else args.jobs
+    if args.layers:
+        values["max_layers"] = 1
+    return Settings(**values)
+
+
+def describe(report: dict[str, Any]) -> str:
+    """One line for people."""
+    names = ", ".join(report["layers"])
+    quality = "exact" if report["psnr"] is None else f"{report['psnr']:.2f} dB"
+    return (
+        f"{report['output']}: {report['width']}x{report['height']}, {report['bytes']} bytes, "
+        f"{report['bpp']:.3f} bpp, PSNR {quality}, {len(report['layers'])} layers ({names}), "
+        f"{report['seconds']:.1f} s"
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,118 @@
+"""pxi-info: what a .pxi file holds. Needs neither numpy nor the pixels."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from typing import Any
+
+from ..container.chunks import VERSION
+from ..container.file import Container, parse
+from ..files import read_bytes
+from .common import parser, run
+
+CODERS = {1: "implicit"}
+
+
+def arguments() -> argparse.ArgumentParser:
+    """The command line."""
+    p = parser("pxi-info", "Describe a .pxi file.")
+    p.add_argument("input", metavar="IN", help=".pxi file, or - for standard input")
+    p.add_argument("--json", action="store_true", help="print JSON")
+    return p
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Entry point; returns the exit code."""
+    args = arguments().parse_args(argv)
+    return run("pxi-info", lambda: show(args))
+
+
+def show(args: argparse.Namespace) -> None:
+    """Prints the description."""
+    data = read_bytes(args.input)
+    facts = describe(parse(data), len(data))
+    print(json.dumps(facts, indent=2, ensure_ascii=False) if args.json else text(facts))
+
+
+def describe(c: Container, size: int) -> dict[str, Any]:
+    """Facts about a file of `size` bytes, ready for JSON."""
+    width, height = c.head["size"]
+    areas = (c.info or {}).get("areas") or [None] * len(c.layers)
+    layers = []
+    for layer, texture, area in zip(c.layers, c.textures, areas, strict=True):
+        layers.append(
+            {
+                "name": layer["name"],
+                "box": list(layer["box"]),
+                "area": area,
+                "segments": sum(layer["segments"]),
+                "coder": CODERS[texture["coder"]],
+                "grid": list(texture["grid"]),
+                "bits": texture["bits"],
+                "network": texture["network"],
+                "boundary_bytes": len(layer["classes"]) + len(layer["deltas"]),
+                "texture_bytes": len(texture["codes"]) + len(texture["stored"]),
+            }
+        )
+    networks = [
+        {k: n[k] for k in ("dim", "octaves", "hidden", "depth", "channels", "bits")}
+        | {"bytes": len(n["weights"]) + len(n["steps"]) + len(n["biases"])}
+        for n in c.networks
+    ]
+    return {
+        "version": f"{VERSION[0]}.{VERSION[1]}",
+        "bytes": size,
+        "bpp": round(8 * size / (width * height), 4),
+        "width": width,
+        "height": height,
+        "alpha": not c.head["opaque"],
+        "depth": c.head["depth"],
+        "layers": layers,
+        "networks": networks,
+        "metadata": {name: len(block) for name, block in c.blocks.items()},
+        "chunk_bytes": dict(c.sizes),
+        "encoder": (c.info or {}).get("encoder"),
+        "settings": settings(c),
+    }
+
+
+def settings(c: Container) -> Any:
+    """The encoder's settings, if the file tells and they are valid JSON."""
+    try:
+        return json.loads(c.info["settings"]) if c.info else None
+    except ValueError:
+        return None
+
+
+def text(f: dict[str, Any]) -> str:
+    """The facts for people."""
+    alpha = "with transparency" if f["alpha"] else "opaque"
+    lines = [
+        f"pxi {f['version']}, {f['width']}x{f['height']}, {alpha}, {f['depth']}-bit original",
+        f"{f['bytes']} bytes, {f['bpp']:.3f} bpp: "
+        + ", ".join(f"{name} {size}" for name, size in f["chunk_bytes"].items()),
+    ]
+    for i, v in enumerate(f["layers"]):
+        x, y, w, h = v["box"]
+        area = "" if v["area"] is None else f", {v['area']} px visible"
+        outline = f"{v['segments']} segments" if v["segments"] else "whole canvas"
+        lines.append(
+            f"layer {i} {v['name']!r}: {w}x{h} at {x},{y}{area}, {outline}, {v['coder']} "
+            f"{v['grid'][0]}x{v['grid'][1]} codes of {v['bits']} bits, "
+            f"{v['boundary_bytes']} + {v['texture_bytes']} bytes"
+        )
+    for i, n in enumerate(f["networks"]):
+        lines.append(
+            f"network {i}: {n['dim']} features, {n['octaves']} octaves, {n['depth']} hidden layers "
+            f"of {n['hidden']}, {n['channels']} outputs, {n['bits']} bits, {n['bytes']} bytes"
+        )
+    lines += [f"{name}: {size} bytes" for name, size in f["metadata"].items()]
+    if f["encoder"]:
+        lines.append(f"made by {f['encoder']}, {json.dumps(f['settings'])}")
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
