@@ -5,7 +5,7 @@ PHOTO := docs/images/photo.png
 
 .PHONY: demo test lint bench clean
 
-.venv/ready: pyproject.toml constraints.txt setup.py proxyimg_codec/texture/_kernel.cpp
+.venv/ready: pyproject.toml constraints.txt setup.py proxyimg_codec/_kernel.cpp proxyimg_codec/_kernel_decode.h
 	$(PYTHON) -m venv .venv
 	$(BIN)/pip install --quiet -c constraints.txt setuptools
 	$(BIN)/pip install --quiet -c constraints.txt -e '.[dev]'
@@ -28,4 +28,4 @@ bench: .venv/ready
 	$(BIN)/python -m benchmarks.figures
 
 clean:
-	rm -rf .venv demo build *.egg-info proxyimg_codec/texture/_kernel*.so
+	rm -rf .venv demo build *.egg-info proxyimg_codec/_kernel*.so

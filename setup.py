@@ -16,8 +16,9 @@ else:
 setup(
     ext_modules=[
         Extension(
-            "proxyimg_codec.texture._kernel",
-            ["proxyimg_codec/texture/_kernel.cpp"],
+            "proxyimg_codec._kernel",
+            ["proxyimg_codec/_kernel.cpp"],
+            depends=["proxyimg_codec/_kernel_decode.h"],
             extra_compile_args=flags,
             extra_link_args=link,
             optional=True,

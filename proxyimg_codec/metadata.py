@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 _JPEG_EXIF = b"Exif\0\0"
 _JPEG_XMP = b"http://ns.adobe.com/xap/1.0/\0"
@@ -35,6 +36,16 @@ def _jpeg(data: bytes) -> Iterator[tuple[str, bytes]]:
         at = max(end, at + 4)
 
 
+def is_cut_jpeg(data: bytes) -> bool:
+    """Whether JPEG data stops before its end marker; decoders fill the rest with grey."""
+    at = 2
+    while data[:2] == b"\xff\xd8" and at + 4 <= len(data) and data[at] == 0xFF:
+        if data[at + 1] == 0xDA:
+            return data.find(b"\xff\xd9", at) < 0
+        at += 2 + int.from_bytes(data[at + 2 : at + 4], "big")
+    return False
+
+
 def _png(data: bytes) -> Iterator[tuple[str, bytes]]:
     at = 8 if data[:8] == b"\x89PNG\r\n\x1a\n" else len(data)
     while at + 12 <= len(data):
@@ -62,11 +73,20 @@ def _webp(data: bytes) -> Iterator[tuple[str, bytes]]:
         at += 8 + size + size % 2
 
 
-def upright(exif: bytes) -> bytes:
-    """The EXIF block with its orientation set to 1, because the pixels have been turned.
+def upright(blocks: Mapping[str, bytes]) -> dict[str, bytes]:
+    """The blocks with their orientation set to 1, because the pixels have been turned.
 
-    A block without the tag, or one that cannot be read, is returned as it is.
+    A block without the tag, or one that cannot be read, stays as it is.
     """
+    change = {"exif": _upright_exif, "xmp": _upright_xmp}
+    return {name: change.get(name, bytes)(block) for name, block in blocks.items()}
+
+
+def _upright_xmp(xmp: bytes) -> bytes:
+    return re.sub(rb"""(tiff:Orientation(?:\s*=\s*["']|>)\s*)[2-8]""", rb"\g<1>1", xmp)
+
+
+def _upright_exif(exif: bytes) -> bytes:
     order = {b"II*\0": "<", b"MM\0*": ">"}.get(exif[:4])
     if order is None or len(exif) < 10:
         return exif

@@ -22,9 +22,15 @@ from numpy.typing import NDArray
 
 from .errors import InputError, UnsupportedError, UsageError
 from .files import read_bytes, write_atomically
-from .metadata import png_chunks, raw_blocks, upright
+from .metadata import is_cut_jpeg, png_chunks, raw_blocks, upright
 
 Pixels = NDArray[Any]
+
+_PREMULTIPLIED = ("iff", "openexr", "rla")
+"""OpenImageIO types whose alpha is premultiplied by convention, and that it does not convert."""
+
+_NO_FILES = ("null", "term")
+"""OpenImageIO types that are not files."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,21 +61,21 @@ def read(path: str | os.PathLike[str]) -> Picture:
         return Picture(_read_npy(data, name))
     pixels, icc, orientation = _read_oiio(data, name)
     blocks = raw_blocks(data)
-    if icc:
+    # Output is RGB: the profile of a grey or CMYK original would not describe it.
+    if icc[16:20] == b"RGB ":
         blocks["icc"] = icc
-    if "exif" in blocks:
-        blocks["exif"] = upright(blocks["exif"])
-    return Picture(_turn(pixels, orientation), blocks)
+    return Picture(_turn(pixels, orientation), upright(blocks))
 
 
 def _read_npy(data: bytes, name: str) -> Pixels:
     try:
-        array = np.load(io.BytesIO(data), allow_pickle=False)
+        array: Pixels = np.load(io.BytesIO(data), allow_pickle=False)
     except (ValueError, EOFError, OSError, SyntaxError):
         raise InputError(f"{name}: not a valid NPY file without pickled objects") from None
-    if not isinstance(array, np.ndarray):
-        raise InputError(f"{name}: not an NPY array")
-    return array
+    if array.ndim not in (2, 3) or array.size == 0:
+        raise InputError(f"{name}: an array of shape {array.shape} is not a picture")
+    native: Pixels = array.astype(array.dtype.newbyteorder("="))
+    return native
 
 
 def _import_oiio() -> Any:
@@ -92,7 +98,7 @@ def _read_oiio(data: bytes, name: str) -> tuple[Pixels, bytes, int]:
         file.write(data)
         file.flush()
         source = oiio.ImageInput.open(file.name, wanted)
-        if source is None:
+        if source is None or source.format_name() in _NO_FILES:
             oiio.geterror()
             raise InputError(f"{name}: not a picture in a known format")
         spec = source.spec()
@@ -102,13 +108,19 @@ def _read_oiio(data: bytes, name: str) -> tuple[Pixels, bytes, int]:
         problem = source.geterror()
         source.close()
     if pixels is None:
-        raise InputError(f"{name}: damaged or truncated ({problem.splitlines()[0]})")
+        problem = (problem or "unknown reason").splitlines()[0]
+        raise InputError(f"{name}: damaged or truncated ({problem})")
+    if is_cut_jpeg(data):
+        raise InputError(f"{name}: damaged or truncated (the end of the JPEG data is missing)")
     pixels = np.asarray(pixels)
     if pixels.ndim != 3 or pixels.size == 0:
         raise InputError(f"{name}: not a two-dimensional picture")
-    if spec.nchannels > 4:
-        pixels = pixels[..., :4] if spec.channelnames[3:4] == ("A",) else pixels[..., :3]
-    if pixels.shape[2] in (2, 4) and not spec.get_int_attribute("oiio:UnassociatedAlpha"):
+    colours = 3 if spec.nchannels > 2 else 1
+    alpha = "A" in spec.channelnames[colours : colours + 1]
+    pixels = pixels[..., : colours + alpha]
+    # A TIFF file without this attribute says that its alpha is premultiplied.
+    straight = spec.get_int_attribute("oiio:UnassociatedAlpha")
+    if alpha and not straight and source.format_name() in (*_PREMULTIPLIED, "tiff"):
         pixels = _straight(pixels)
     icc = spec.getattribute("ICCProfile")
     return pixels, b"" if icc is None else bytes(icc), spec.get_int_attribute("Orientation", 1)
@@ -228,7 +240,7 @@ def _encode_oiio(kind: str, pixels: Pixels, blocks: dict[str, bytes]) -> bytes:
     with tempfile.TemporaryDirectory() as folder, _silent_stderr():
         name = str(Path(folder) / f"picture{kind}")
         target = oiio.ImageOutput.create(name)
-        if target is None:
+        if target is None or target.format_name() in _NO_FILES:
             oiio.geterror()
             raise UnsupportedError(f"files of type {kind} cannot be written")
         height, width, channels = pixels.shape
@@ -240,8 +252,27 @@ def _encode_oiio(kind: str, pixels: Pixels, blocks: dict[str, bytes]) -> bytes:
         if "icc" in blocks:
             profile = np.frombuffer(blocks["icc"], np.uint8)
             spec.attribute("ICCProfile", oiio.TypeDesc(f"uint8[{len(profile)}]"), profile)
-        if not target.open(name, spec) or not target.write_image(np.ascontiguousarray(pixels)):
-            problem = (target.geterror() or "unknown reason").splitlines()[0]
+        if channels == 4 and target.format_name() in _PREMULTIPLIED:
+            pixels = _associated(pixels)
+        good = target.open(name, spec)
+        if good and _loses_bits(formats[str(pixels.dtype)], str(target.spec().format)):
+            raise UsageError(f"{kind} holds fewer bits a sample than asked for; write PNG or TIFF")
+        good = good and target.write_image(np.ascontiguousarray(pixels)) and target.close()
+        # Some writers report success and leave a stump.
+        if not good or oiio.ImageInput.open(name) is None:
+            problem = (target.geterror() or oiio.geterror() or "unknown reason").splitlines()[0]
             raise UnsupportedError(f"{kind} cannot hold this picture: {problem}")
-        target.close()
         return Path(name).read_bytes()
+
+
+def _loses_bits(wanted: str, got: str) -> bool:
+    return got == "uint8" != wanted or (wanted == "float" and got != "float")
+
+
+def _associated(pixels: Pixels) -> Pixels:
+    """Straight -> premultiplied alpha."""
+    top = 1.0 if pixels.dtype.kind == "f" else float(np.iinfo(pixels.dtype).max)
+    colour = pixels[..., :-1] * (pixels[..., -1:] / top)
+    if pixels.dtype.kind != "f":
+        colour = np.rint(colour)
+    return np.concatenate([colour.astype(pixels.dtype), pixels[..., -1:]], axis=2)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import io
 import os
 import sys
 from collections.abc import Callable
@@ -29,44 +30,75 @@ def parser(prog: str, description: str) -> argparse.ArgumentParser:
 
 def run(prog: str, work: Callable[[], None]) -> int:
     """Runs a tool; errors become one line on stderr and an exit code."""
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        # Names of layers may hold what the terminal cannot show.
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
         work()
-        sys.stdout.flush()
+        print(end="", flush=True)
+        return 0
     except PxiError as error:
-        print(f"{prog}: {error}", file=sys.stderr)
-        return error.exit_code
+        code, message = error.exit_code, str(error)
     except KeyboardInterrupt:
-        print(f"{prog}: interrupted, nothing written", file=sys.stderr)
-        return 130
+        code, message = 130, "interrupted"
     except MemoryError:
-        print(f"{prog}: not enough memory; ask for a smaller picture or region", file=sys.stderr)
-        return 6
+        code, message = 6, "not enough memory; ask for a smaller picture or region"
     except BrokenPipeError:
         # The reader of our output has gone; there is nobody left to tell.
+        code, message = 3, ""
+    except OSError as error:
+        place = "" if error.filename is None else f"{error.filename}: "
+        code, message = 3, f"{place}{error.strerror or error}"
+    _drop_output()
+    if message:
+        print(f"{prog}: {' '.join(message.splitlines())}", file=sys.stderr)
+    return code
+
+
+def _drop_output() -> None:
+    """Forgets output that cannot be written, which Python would complain about at its end."""
+    try:
+        print(end="", flush=True)
+    except OSError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        return 3
-    return 0
+
+
+def default_target(source: str, suffix: str) -> str:
+    """Where the output of `source` goes if the user does not say.
+
+    Raises:
+        InputError: `source` is not the name of a file.
+    """
+    if source == "-":
+        return "-"
+    try:
+        return str(Path(source).with_suffix(suffix))
+    except ValueError:
+        raise InputError(f"{source!r} is not the name of a file") from None
 
 
 def check_target(path: str, force: bool, source: str | None = None) -> None:
     """Refuses a target that exists, is the source, or whose folder does not exist.
+
+    Pipes and devices may exist: writing to them replaces nothing.
 
     Raises:
         UsageError: Input and output are the same file.
         InputError: The file exists and `force` is off, or its folder is missing.
     """
     if path == "-":
-        if sys.stdout.isatty():
+        if sys.stdout is not None and sys.stdout.isatty():
             raise UsageError("refusing to write binary data to a terminal; redirect it")
         return
     target = Path(path)
-    if source not in (None, "-") and target.exists() and target.samefile(str(source)):
+    same = source not in (None, "-") and target.exists() and os.path.exists(str(source))
+    if same and target.samefile(str(source)):
         raise UsageError(f"{path}: input and output are the same file")
     if target.is_dir():
         raise InputError(f"{path}: is a folder")
     if not target.parent.is_dir():
         raise InputError(f"{path}: its folder does not exist")
-    if target.exists() and not force:
+    if target.is_file() and not force:
         raise InputError(f"{path}: exists already; use --force to replace it")
 
 

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import time
-from pathlib import Path
 from typing import Any
 
-from .common import Bar, check_target, parser, run
+from ..errors import UsageError
+from .common import Bar, check_target, default_target, parser, run
 
 
 def arguments() -> argparse.ArgumentParser:
     """The command line."""
     p = parser("pxi-decode", "Render a .pxi file at any size and region.")
     p.add_argument("input", metavar="IN", help=".pxi file, or - for standard input")
-    p.add_argument("output", metavar="OUT", nargs="?", help="picture file, type by suffix; - writes "
-                   "PNG to standard output; IN with the suffix .png by default")  # fmt: skip
+    p.add_argument("output", metavar="OUT", nargs="?", help="picture file, type by suffix; - "
+                   "writes PNG to standard output; IN with the suffix .png by default")  # fmt: skip
     add = p.add_argument
     add("--scale", type=float, help="output pixels a canvas pixel")
     add("--width", type=int, help="output width; the height follows")
@@ -48,14 +49,16 @@ def decode_file(args: argparse.Namespace) -> None:
         check_target(output, args.force, args.input)
     else:
         refuse_render_flags(args)
-    if args.export_onnx:
+    if args.export_onnx is not None:
         check_target(args.export_onnx, args.force, args.input)
+        if rendering and os.path.realpath(output) == os.path.realpath(args.export_onnx):
+            raise UsageError(f"{output}: the picture and the ONNX model need two files")
 
     from ..image import open_image
 
     started = time.perf_counter()
     image = open_image(args.input)
-    if args.export_onnx:
+    if args.export_onnx is not None:
         export(image, args)
     if rendering:
         render(image, output, args)
@@ -69,11 +72,10 @@ def refuse_render_flags(args: argparse.Namespace) -> None:
     Raises:
         UsageError: A rendering flag was given, but nothing is rendered.
     """
-    from ..errors import UsageError
-
-    flags = ("scale", "width", "height", "region", "layer", "no_background", "bit_depth")
+    flags = ("scale", "width", "height", "region", "no_background", "bit_depth")
     for name in flags:
-        if getattr(args, name):
+        value = getattr(args, name)
+        if value is not None and value is not False:
             raise UsageError(f"--{name.replace('_', '-')} needs an output picture")
     if args.engine != "auto":
         raise UsageError("--engine needs an output picture")
@@ -81,14 +83,11 @@ def refuse_render_flags(args: argparse.Namespace) -> None:
 
 def target(args: argparse.Namespace) -> str:
     """Where the picture goes."""
-    if args.output:
-        return str(args.output)
-    return "-" if args.input == "-" else str(Path(args.input).with_suffix(".png"))
+    return default_target(args.input, ".png") if args.output is None else str(args.output)
 
 
 def export(image: Any, args: argparse.Namespace) -> None:
     """Writes the network of the back layer, or of the one layer that was asked for."""
-    from ..errors import UsageError
     from ..export.onnx_network import build
     from ..files import write_atomically
 
@@ -108,7 +107,8 @@ def selected(image: Any, names: list[str] | None) -> list[Any]:
 
 def key(name: str) -> str | int:
     """A layer's address: digits are an index, everything else a name."""
-    return int(name) if name.removeprefix("-").isdecimal() else name
+    digits = name.removeprefix("-")
+    return int(name) if digits.isdecimal() and len(digits) < 10 else name
 
 
 def render(image: Any, output: str, args: argparse.Namespace) -> None:
@@ -144,8 +144,6 @@ def parse_region(text: str | None) -> tuple[int, int, int, int] | None:
     Raises:
         UsageError: Not four integers.
     """
-    from ..errors import UsageError
-
     if text is None:
         return None
     try:

@@ -8,10 +8,9 @@ import os
 import sys
 import time
 from dataclasses import fields
-from pathlib import Path
 from typing import Any
 
-from .common import Bar, check_target, parser, run
+from .common import Bar, check_target, default_target, parser, run
 
 PRESET_NAMES = ("fast", "default", "best")
 
@@ -30,7 +29,7 @@ def arguments() -> argparse.ArgumentParser:
     add("--preset", choices=PRESET_NAMES, default="default",
         help="effort 2, 5 or 8; --effort goes before it")  # fmt: skip
     add("--masks", metavar="PATH", help="folder of mask PNGs, or one label PNG: the layers to make")
-    add("--max-layers", type=int, default=4, metavar="N", help="most layers found; default 4")
+    add("--max-layers", type=int, metavar="N", help="most layers found; default 4")
     add("--layers", type=int, choices=[1], help="1: one layer, no decomposition")
     add("--boundary", choices=["lsq", "chamfer"], default="lsq", help="boundary fit: least squares "
         "(default), or the slower adaptive Chamfer fit of the paper")  # fmt: skip
@@ -74,7 +73,7 @@ def encode_file(args: argparse.Namespace) -> None:
     from ..quality import psnr
 
     height, width = picture.pixels.shape[:2]
-    masks = load_masks(args.masks, width, height) if args.masks else None
+    masks = None if args.masks is None else load_masks(args.masks, width, height)
     bar = Bar(settings.steps, "fitting", args.quiet or args.json)
     seen = 0
 
@@ -119,9 +118,7 @@ def encode_file(args: argparse.Namespace) -> None:
 
 def target(args: argparse.Namespace) -> str:
     """Where the output goes."""
-    if args.output:
-        return str(args.output)
-    return "-" if args.input == "-" else str(Path(args.input).with_suffix(".pxi"))
+    return default_target(args.input, ".pxi") if args.output is None else str(args.output)
 
 
 def settings_from(args: argparse.Namespace) -> Any:
@@ -133,9 +130,12 @@ def settings_from(args: argparse.Namespace) -> Any:
     from ..encoder.settings import PRESETS, Settings
     from ..errors import UsageError
 
-    if args.layers and args.masks:
-        raise UsageError("--layers 1 and --masks contradict each other")
-    values = {k: v for k, v in vars(args).items() if k in {f.name for f in fields(Settings)}}
+    rivals = [n for n in ("layers", "masks", "max_layers") if getattr(args, n) is not None]
+    if len(rivals) > 1:
+        names = " and ".join(f"--{n.replace('_', '-')}" for n in rivals)
+        raise UsageError(f"{names} contradict each other")
+    names_of_settings = {f.name for f in fields(Settings)}
+    values = {k: v for k, v in vars(args).items() if k in names_of_settings and v is not None}
     values["effort"] = PRESETS[args.preset] if args.effort is None else args.effort
     values["jobs"] = (os.cpu_count() or 1) if args.jobs is None else args.jobs
     if args.layers:

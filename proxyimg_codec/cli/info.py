@@ -33,7 +33,7 @@ def show(args: argparse.Namespace) -> None:
     """Prints the description."""
     data = read_bytes(args.input)
     facts = describe(parse(data), len(data))
-    print(json.dumps(facts, indent=2, ensure_ascii=False) if args.json else text(facts))
+    print(json.dumps(facts, indent=2) if args.json else text(facts))
 
 
 def describe(c: Container, size: int) -> dict[str, Any]:
@@ -82,7 +82,7 @@ def settings(c: Container) -> Any:
     """The encoder's settings, if the file tells and they are valid JSON."""
     try:
         return json.loads(c.info["settings"]) if c.info else None
-    except ValueError:
+    except (ValueError, RecursionError):
         return None
 
 
@@ -110,7 +110,7 @@ def text(f: dict[str, Any]) -> str:
         )
     lines += [f"{name}: {size} bytes" for name, size in f["metadata"].items()]
     if f["encoder"]:
-        lines.append(f"made by {f['encoder']}, {json.dumps(f['settings'])}")
+        lines.append(f"made by {f['encoder']!r}, {json.dumps(f['settings'])}")
     return "\n".join(lines)
 
 

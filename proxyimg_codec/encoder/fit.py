@@ -111,6 +111,7 @@ def train(
         while len(queue) < count * batch:
             queue = np.concatenate([queue, rng.permutation(problem.pixels).astype(np.int32)])
         pixels, queue = queue[: count * batch].reshape(count, batch), queue[count * batch :]
+        pixels.sort(axis=1)  # neighbours together: the trainer touches memory in order
         part = decay[start : start + count]
         trainer.run(
             state,
@@ -165,7 +166,7 @@ def quantize(values: Floats, steps: Floats, bits: int) -> NDArray[np.int8]:
 
 def make_trainer(problem: Problem, device: str, jobs: int) -> Trainer:
     """The compiled trainer on a CPU where it was built, otherwise torch."""
-    from ..texture import kernel
+    from .. import kernel
 
     if device == "cpu" and kernel.available():
         from .fit_native import NativeTrainer

@@ -7,7 +7,7 @@ import ctypes as ct
 import numpy as np
 from numpy.typing import NDArray
 
-from ..texture import kernel
+from .. import kernel
 from ..texture.network import Floats
 from .fit import State
 from .problem import Problem
@@ -39,9 +39,10 @@ class NativeTrainer:
             kernel.Net(s.dim, s.octaves, s.hidden, s.depth, s.channels),
             kernel.Entries(at(p.base), at(p.stride), at(p.fx), at(p.fy)),
             p.codes,
-            at(p.first), at(p.coverage), at(p.target),
+            at(p.first), at(p.coverage), at(p.learn), at(p.target),
             at(state.codes), at(m[0]), at(m[1]),
             at(state.weights), at(m[2]), at(m[3]),
+            at(p.prior.rows), at(p.prior.next), at(p.prior.weight), len(p.prior.rows),
             at(self._plane), at(state.code_steps), at(state.row_steps),
             _top(state.code_bits), _top(state.net_bits), self._jobs,
         )  # fmt: skip

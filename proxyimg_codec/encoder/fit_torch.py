@@ -33,6 +33,9 @@ class TorchTrainer:
             self._tensor(a) for a in (problem.base, problem.stride, problem.fx, problem.fy)
         ]
         self._coverage = self._tensor(problem.coverage)
+        self._learn = self._tensor(problem.learn)[:, None]
+        prior = problem.prior
+        self._prior = [self._tensor(a) for a in (prior.rows, prior.next, prior.weight)]
         self._target = self._tensor(problem.target)
         plane = np.repeat(np.arange(len(problem.planes)), [p.size for p in problem.planes])
         self._plane = self._tensor(plane)
@@ -90,7 +93,10 @@ class TorchTrainer:
         offset = torch.arange(len(owner), device=batch.device)
         rank = offset - (torch.cumsum(count, 0) - count)[owner]
         entry = start[owner] + rank
-        output = self._network(self._features(codes, entry), net)
+        features = interpolate(codes, *(t[entry] for t in self._taps))
+        output = run_network(features, net, self._shape.octaves)
+        learn = self._learn[entry]
+        output = learn * output + (1 - learn) * output.detach()
         coverage = self._coverage[entry]
         result = torch.zeros_like(self._target[batch])
         clear = torch.ones(len(batch), device=batch.device)
@@ -101,26 +107,33 @@ class TorchTrainer:
             result = result.index_add(0, pixel, weight[:, None] * p)
             alpha = p[:, 3].clamp(0, 1) if p.shape[1] == 4 else 1.0
             clear = clear.index_copy(0, pixel, clear[pixel] * (1 - c * alpha))
-        return ((result - self._target[batch]) ** 2).mean()
+        loss = ((result - self._target[batch]) ** 2).mean()
+        row, neighbours, weight = self._prior
+        off = codes[row] - codes[neighbours].mean(1).detach()
+        return loss + (weight[:, None] * off**2).sum() / 2
 
-    def _features(self, codes: Any, entry: Any) -> Any:
-        base, stride, fx, fy = (t[entry] for t in self._taps)
-        base, fx, fy = base.long(), fx[:, None], fy[:, None]
-        below = base + stride
-        top = codes[base] * (1 - fx) + codes[base + 1] * fx
-        return top * (1 - fy) + (codes[below] * (1 - fx) + codes[below + 1] * fx) * fy
 
-    def _network(self, features: Any, net: list[Any]) -> Any:
-        torch = self._torch
-        x = [features]
-        if self._shape.octaves:
-            s, c = torch.sin(math.pi * features), torch.cos(math.pi * features)
-            for _ in range(self._shape.octaves):
-                x += [s, c]
-                s, c = 2 * s * c, 1 - 2 * s * s
-        y = torch.cat(x, 1)
-        for k in range(0, len(net), 2):
-            y = y @ net[k].T + net[k + 1]
-            if k + 2 < len(net):
-                y = torch.relu(y)
-        return y
+def interpolate(codes: Any, base: Any, stride: Any, fx: Any, fy: Any) -> Any:
+    """Features [N, D] by bilinear taps into codes [rows, D]."""
+    base, fx, fy = base.long(), fx[:, None], fy[:, None]
+    below = base + stride
+    top = codes[base] * (1 - fx) + codes[base + 1] * fx
+    return top * (1 - fy) + (codes[below] * (1 - fx) + codes[below + 1] * fx) * fy
+
+
+def run_network(features: Any, net: list[Any], octaves: int) -> Any:
+    """Outputs [N, channels] of a network given as weights and biases in turn."""
+    import torch
+
+    x = [features]
+    if octaves:
+        s, c = torch.sin(math.pi * features), torch.cos(math.pi * features)
+        for _ in range(octaves):
+            x += [s, c]
+            s, c = 2 * s * c, 1 - 2 * s * s
+    y = torch.cat(x, 1)
+    for k in range(0, len(net), 2):
+        y = y @ net[k].T + net[k + 1]
+        if k + 2 < len(net):
+            y = torch.relu(y)
+    return y

@@ -26,7 +26,13 @@ SOFT_SHARE = 0.002
 """Share of half-transparent pixels away from outlines above which textures give alpha."""
 
 FINE_PIXELS = 1 << 20
-"""Up to this size outlines of transparent pictures are traced at a quarter of a pixel."""
+"""Up to this size outlines of transparent pictures are traced on a finer grid."""
+
+FINE = 2
+"""Binary digits of that grid: quarters of a pixel."""
+
+FINE_TOLERANCE: dict[str, dict[str, float]] = {"lsq": {"tolerance": 1.2}, "chamfer": {}}
+"""Fit tolerance there, in quarters of a pixel."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,14 +96,16 @@ def _boundary(mask: NDArray[np.bool_], outline: Floats | None, settings: Setting
         fit_method = fit_paths_chamfer
     if outline is None:
         return Boundary(UNIT, tuple(fit_method(mask, step=2.0**-UNIT)))
-    size = (mask.shape[1] << UNIT, mask.shape[0] << UNIT)
+    size = (mask.shape[1] << FINE, mask.shape[0] << FINE)
     inside = cv2.resize(outline, size, interpolation=cv2.INTER_LINEAR) >= 0.5
     # One pixel of slack: alpha >= 0.5 between pixels may lie just outside the pixel mask.
     near = cv2.resize(_dilate(mask, 1).astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)
     fine = inside & (near > 0)
     if not fine.any():
         fine = cv2.resize(mask.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
-    return Boundary(UNIT, tuple(fit_method(fine, step=1.0)))
+    return Boundary(
+        FINE + 1, tuple(fit_method(fine, step=0.5, **FINE_TOLERANCE[settings.boundary]))
+    )
 
 
 def _dilate(mask: NDArray[np.bool_], radius: int) -> NDArray[np.bool_]:

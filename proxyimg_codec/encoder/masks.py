@@ -93,7 +93,8 @@ def resolve(
         _check_size("the support of the picture", support, width, height)
     free = np.ones((height, width), np.bool_) if support is None else support.copy()
     stack: list[Region] = []
-    for region in sorted(regions[::-1], key=_is_back):
+    front_to_back = list(regions)[::-1]
+    for region in sorted(front_to_back, key=_is_back):
         stack.insert(0, Region(region.name, region.mask & free))
         free &= ~region.mask
     if support is None and stack and _is_back(stack[0]):

@@ -14,6 +14,12 @@ from ..geometry.boundary import Boundary
 from ..texture.implicit import Box, taps
 from ..texture.network import Floats, NetShape
 
+KNOWN = 0.25
+"""A code is known if its pixels weigh at least this share of a whole cell."""
+
+PRIOR = 100.0
+"""Weight of the prior of a code that no pixel weighs on, times the number of pixels."""
+
 
 @dataclass(frozen=True, eq=False)
 class Plane:
@@ -31,6 +37,21 @@ class Plane:
 
 
 @dataclass(frozen=True, eq=False)
+class Prior:
+    """Codes that little is known of, which are drawn to the mean of their neighbours.
+
+    Attributes:
+        rows: int32 [P] rows of the table.
+        next: int32 [P, 4] rows of the neighbours; the code itself at the rim of its plane.
+        weight: float32 [P] weight of the squared distance.
+    """
+
+    rows: NDArray[np.int32]
+    next: NDArray[np.int32]
+    weight: Floats
+
+
+@dataclass(frozen=True, eq=False)
 class Problem:
     """Pixels, their entries (one per layer seen in the pixel, front to back), and targets.
 
@@ -43,7 +64,10 @@ class Problem:
         fx: float32 [entries] horizontal fraction.
         fy: float32 [entries] vertical fraction.
         coverage: float32 [entries] coverage of the layer, 0..1.
+        learn: float32 [entries] 1, or 0 where a layer shows through the rim of another: there
+            only the front layer learns, so that the one behind stays clean.
         target: float32 [pixels, channels], premultiplied.
+        prior: Smoothness of codes that pixels barely determine.
         areas: Visible pixels of each layer.
     """
 
@@ -55,7 +79,9 @@ class Problem:
     fx: Floats
     fy: Floats
     coverage: Floats
+    learn: Floats
     target: Floats
+    prior: Prior
     areas: tuple[int, ...]
 
     @property
@@ -102,6 +128,7 @@ def build(
         planes.append(plane_for(boundary, width, height, spacing, start))
 
     clear = np.ones(height * width, bool)
+    rim = np.zeros(height * width, bool)
     seen: list[NDArray[np.int64]] = []
     parts: list[tuple[NDArray[Any], ...]] = []
     areas = [0] * len(planes)
@@ -119,20 +146,64 @@ def build(
                 t.fx,
                 t.fy,
                 covered[at].astype(np.float32) / cover.FULL,
+                np.where(rim[at], 0, 1).astype(np.float32),
             )
         )
         # With alpha, what lies behind may show through; the picture does not say how much.
         clear &= covered < cover.FULL
+        rim |= covered > 0
     pixel = np.concatenate(seen)
     order = np.argsort(pixel, kind="stable")
     ids, counts = np.unique(pixel, return_counts=True)
-    base, stride, fx, fy, coverage = (np.concatenate(p)[order] for p in zip(*parts, strict=True))
+    base, stride, fx, fy, coverage, learn = (
+        np.concatenate(p)[order] for p in zip(*parts, strict=True)
+    )
     target = picture.reshape(-1, 4)[ids, : shape.channels].astype(np.float32)
     first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+    prior = _prior(planes, spacing, len(ids), base, stride, fx, fy, coverage * learn)
     return Problem(
-        shape, tuple(planes), first, base, stride, fx, fy, coverage,
-        np.ascontiguousarray(target), tuple(areas),
+        shape, tuple(planes), first, base, stride, fx, fy, coverage, learn,
+        np.ascontiguousarray(target), prior, tuple(areas),
     )  # fmt: skip
+
+
+def _prior(
+    planes: Sequence[Plane],
+    spacing: float,
+    pixels: int,
+    base: NDArray[np.int32],
+    stride: NDArray[np.int32],
+    fx: Floats,
+    fy: Floats,
+    weight: Floats,
+) -> Prior:
+    """The prior of all codes whose pixels weigh less than `KNOWN` of what inner codes see."""
+    total = planes[-1].start + planes[-1].size
+    seen = np.zeros(total)
+    touched = np.zeros(total, bool)
+    corners: tuple[tuple[Any, Floats], ...] = (
+        (0, (1 - fx) * (1 - fy)),
+        (1, fx * (1 - fy)),
+        (stride, (1 - fx) * fy),
+        (stride + 1, fx * fy),
+    )
+    for offset, part in corners:
+        seen += np.bincount(base + offset, part * weight, total)
+        touched[base + offset] = True
+    lack = 1 - seen / (KNOWN * spacing**2)
+    rows = np.flatnonzero(touched & (lack > 0))
+    neighbours = np.empty((len(rows), 4), np.int32)
+    for plane in planes:
+        at = (rows >= plane.start) & (rows < plane.start + plane.size)
+        y, x = np.divmod(rows[at] - plane.start, plane.columns)
+        for k, (dy, dx) in enumerate(((0, -1), (0, 1), (-1, 0), (1, 0))):
+            ny = np.clip(y + dy, 0, plane.rows - 1)
+            nx = np.clip(x + dx, 0, plane.columns - 1)
+            there = plane.start + ny * plane.columns + nx
+            neighbours[at, k] = np.where(touched[there], there, rows[at])
+    return Prior(
+        rows.astype(np.int32), neighbours, (PRIOR * lack[rows] / pixels).astype(np.float32)
+    )
 
 
 def _coverage(boundary: Boundary | None, width: int, height: int) -> NDArray[np.int32]:

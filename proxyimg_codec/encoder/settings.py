@@ -12,7 +12,7 @@ from ..texture.network import NetShape
 PRESETS = {"fast": 2, "default": 5, "best": 8}
 """Effort of each preset."""
 
-EFFORT_STEPS = (400, 800, 1600, 3000, 6000, 10000, 16000, 26000, 40000)
+EFFORT_STEPS = (500, 1000, 2000, 5000, 10000, 16000, 24000, 40000, 60000)
 """Optimizer steps at effort 1..9; half of them with quantization in the loop."""
 
 SEGMENTERS = ("auto", "none")

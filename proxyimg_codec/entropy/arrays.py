@@ -9,12 +9,12 @@ change after a wavefront, never inside it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import kernel
 from ..errors import FormatError
 from .rans import SCALE_BITS, Decoder, Encoder, lanes_log2_for
 
@@ -27,7 +27,7 @@ COUNT_START, COUNT_STEP, COUNT_LIMIT = 8, 32, 1 << 14
 Ints = NDArray[np.int64]
 
 
-def _contexts(known: Ints, y: Ints, x: Ints, alphabet: int) -> Ints:
+def _contexts(known: NDArray[np.int16], y: Ints, x: Ints, alphabet: int) -> NDArray[np.int16]:
     """Context [n, C] of positions y, x [n] from `known` [H + 1, W + 2, C], where -1 is unknown."""
     left, up = known[y + 1, x], known[y, x + 1]
     upper_left, upper_right = known[y, x], known[y, x + 2]
@@ -50,9 +50,9 @@ class _Model:
         self._contexts = contexts
         self._channel = np.arange(channels) * contexts
 
-    def rows(self, context: Ints) -> Ints:
+    def rows(self, context: NDArray[np.int16]) -> Ints:
         """Flat row numbers [n * C] of contexts [n, C]."""
-        return (context + self._channel).ravel()
+        return (context.astype(np.int64) + self._channel).ravel()
 
     def cumulative(self, rows: Ints) -> Ints:
         """Cumulative frequencies [n, A + 1]: every symbol has at least 1, all sum to 2**14.
@@ -75,15 +75,16 @@ class _Model:
         self._counts[over] = (self._counts[over] + 1) >> 1
 
 
-def _wavefronts(stored: NDArray[np.bool_]) -> Iterator[tuple[Ints, Ints]]:
-    """Positions (y, x) of each wavefront in coding order; y ascends within a wavefront."""
+def _wavefronts(stored: NDArray[np.bool_]) -> tuple[Ints, Ints, Ints]:
+    """Stored positions y [N], x [N] in coding order, and where each wavefront starts [W + 1].
+
+    y ascends within a wavefront.
+    """
     y, x = np.nonzero(stored)
     t = x + 2 * y
     order = np.lexsort((y, t))
-    y, x, t = y[order], x[order], t[order]
-    bounds = np.flatnonzero(np.diff(t, prepend=-1, append=-1))
-    for a, b in pairwise(bounds):
-        yield y[a:b], x[a:b]
+    bounds = np.flatnonzero(np.diff(t[order], prepend=-1, append=-1))
+    return y[order], x[order], bounds if len(y) else np.zeros(1, np.int64)
 
 
 def encode(values: NDArray[np.integer], bits: int, stored: NDArray[np.bool_]) -> bytes:
@@ -92,10 +93,12 @@ def encode(values: NDArray[np.integer], bits: int, stored: NDArray[np.bool_]) ->
     low = bits - high
     channels, height, width = values.shape
     model = _Model(channels, 1 << high)
-    known = np.full((height + 1, width + 2, channels), -1, np.int64)
+    known = np.full((height + 1, width + 2, channels), -1, np.int16)
     top = np.moveaxis(values.astype(np.int64) >> low, 0, -1)
     encoder = Encoder(lanes_log2_for(int(stored.sum()) * channels))
-    for y, x in _wavefronts(stored):
+    ys, xs, bounds = _wavefronts(stored)
+    for a, b in pairwise(bounds):
+        y, x = ys[a:b], xs[a:b]
         rows = model.rows(_contexts(known, y, x, 1 << high))
         symbols = top[y, x].ravel()
         cdf = model.cumulative(rows)
@@ -119,28 +122,33 @@ def decode(
     high = min(bits, MODEL_BITS)
     low = bits - high
     channels, height, width = shape
-    model = _Model(channels, 1 << high)
-    known = np.full((height + 1, width + 2, channels), -1, np.int64)
+    known = np.full((height + 1, width + 2, channels), -1, np.int16)
     decoder = Decoder(data)
-    for y, x in _wavefronts(stored):
-        rows = model.rows(_contexts(known, y, x, 1 << high))
-        cdf = model.cumulative(rows)
-        symbols = np.empty(len(rows), np.int64)
-        for i in range(0, len(rows), decoder.lanes):
-            group = cdf[i : i + decoder.lanes]
-            slot = decoder.slots(len(group))
-            found = (group[:, 1:] <= slot[:, None]).sum(1)
-            at = np.arange(len(group))
-            start = group[at, found]
-            decoder.advance(slot, start, group[at, found + 1] - start)
-            symbols[i : i + decoder.lanes] = found
-        model.update(rows, symbols)
-        known[y + 1, x + 1] = symbols.reshape(-1, channels)
+    _decode_symbols(decoder, known, stored, 1 << high)
     decoder.finish()
     out = np.zeros(shape, np.uint8)
-    out[:, stored] = known[1:, 1:-1][stored].T << low
+    out[:, stored] = (known[1:, 1:-1][stored].T << low).astype(np.uint8)
     out[:, stored] |= unpack_bits(data[decoder.end :], out[:, stored].shape, low)
     return out
+
+
+def _decode_symbols(
+    decoder: Decoder, known: NDArray[np.int16], stored: NDArray[np.bool_], alphabet: int
+) -> None:
+    """Fills `known` [H + 1, W + 2, C] where `stored`."""
+    ys, xs, bounds = _wavefronts(stored)
+    if kernel.available():
+        kernel.decode(
+            decoder, known, ys, xs, bounds, alphabet, (COUNT_START, COUNT_STEP, COUNT_LIMIT)
+        )
+        return
+    model = _Model(known.shape[2], alphabet)
+    for a, b in pairwise(bounds):
+        y, x = ys[a:b], xs[a:b]
+        rows = model.rows(_contexts(known, y, x, alphabet))
+        symbols = decoder.symbols(model.cumulative(rows))
+        model.update(rows, symbols)
+        known[y + 1, x + 1] = symbols.reshape(len(y), -1)
 
 
 def pack_bits(values: Ints, width: int) -> bytes:

@@ -7,6 +7,8 @@ few array operations. The encoder runs backwards, hence it records everything fi
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,10 +22,18 @@ LOW = 1 << 16
 
 MAX_LANES_LOG2 = 10
 
+_SLOT_MASK = np.uint64((1 << SCALE_BITS) - 1)
+_SCALE_SHIFT, _WORD_SHIFT, _LOW = np.uint64(SCALE_BITS), np.uint64(16), np.uint64(LOW)
+
 
 def lanes_log2_for(symbols: int) -> int:
-    """Lanes an encoder uses: enough for array speed, few enough that 4 bytes a lane cost < 1 %."""
-    return min(max((symbols // 1024).bit_length() - 1, 0), MAX_LANES_LOG2)
+    """Lanes an encoder uses: enough for array speed, few enough to cost about 1 %."""
+    return min(max((symbols // 512).bit_length() - 1, 0), MAX_LANES_LOG2)
+
+
+@functools.lru_cache(maxsize=64)
+def _row_starts(count: int, width: int) -> NDArray[np.int64]:
+    return np.arange(count) * width
 
 
 class Encoder:
@@ -65,6 +75,13 @@ class Encoder:
 class Decoder:
     """Reads a stream made by `Encoder` from the front of `data`.
 
+    Attributes:
+        lanes: Number of states.
+        states: uint64 [lanes].
+        words: uint64 [words].
+        used: Words read so far.
+        end: Offset in `data` of the first byte after the stream.
+
     Raises:
         FormatError: The stream is truncated or corrupt.
     """
@@ -72,37 +89,46 @@ class Decoder:
     def __init__(self, data: bytes) -> None:
         if not data or data[0] > MAX_LANES_LOG2:
             raise FormatError("entropy-coded stream is empty or has too many lanes")
-        self.lanes = 1 << data[0]
+        self.lanes, self.scale_bits = 1 << data[0], SCALE_BITS
         head = 1 + 4 * self.lanes + 4
         if len(data) < head:
             raise FormatError("entropy-coded stream is truncated")
-        self._state = np.frombuffer(data, "<u4", self.lanes, 1).astype(np.uint64)
+        self.states = np.frombuffer(data, "<u4", self.lanes, 1).astype(np.uint64)
         count = int.from_bytes(data[head - 4 : head], "little")
         if len(data) < head + 2 * count:
             raise FormatError("entropy-coded stream is truncated")
-        self._words = np.frombuffer(data, "<u2", count, head).astype(np.uint64)
-        self._next = 0
+        self.words = np.frombuffer(data, "<u2", count, head).astype(np.uint64)
+        self.used = 0
         self.end = head + 2 * count
-        """Offset of the first byte after the stream."""
 
-    def slots(self, n: int) -> NDArray[np.int64]:
-        """Slots [n], in 0 .. 2**SCALE_BITS - 1, of the next group; n <= lanes."""
-        return (self._state[:n] & np.uint64((1 << SCALE_BITS) - 1)).astype(np.int64)
+    def symbols(self, cdf: NDArray[np.int64]) -> NDArray[np.int64]:
+        """The next N symbols, whose cumulative frequencies are the rows of `cdf` [N, A + 1].
 
-    def advance(
-        self, slot: NDArray[np.int64], start: NDArray[np.integer], freq: NDArray[np.integer]
-    ) -> None:
-        """Consumes a group whose symbols have `start` <= `slot` < `start + freq`, all [n]."""
-        n = len(slot)
-        x = freq.astype(np.uint64) * (self._state[:n] >> np.uint64(SCALE_BITS))
-        x += (slot - start).astype(np.uint64)
-        low = np.flatnonzero(x < LOW)
-        stop = self._next + len(low)
-        if stop > len(self._words):
-            raise FormatError("entropy-coded stream ends too early")
-        x[low] = (x[low] << np.uint64(16)) | self._words[self._next : stop]
-        self._next = stop
-        self._state[:n] = x
+        Raises:
+            FormatError: The stream ends too early.
+        """
+        n, width = cdf.shape
+        table = cdf.astype(np.uint64)
+        out = np.empty(n, np.int64)
+        for i in range(0, n, self.lanes):
+            rows = table[i : i + self.lanes]
+            count = len(rows)
+            state = self.states[:count]
+            slot = state & _SLOT_MASK
+            found = np.count_nonzero(rows[:, 1:] <= slot[:, None], axis=1)
+            at = found + _row_starts(count, width)
+            flat = rows.ravel()
+            start = flat[at]
+            state = (flat[at + 1] - start) * (state >> _SCALE_SHIFT) + slot - start
+            low = (state < _LOW).nonzero()[0]
+            stop = self.used + len(low)
+            if stop > len(self.words):
+                raise FormatError("entropy-coded stream ends too early")
+            state[low] = state[low] << _WORD_SHIFT | self.words[self.used : stop]
+            self.used = stop
+            self.states[:count] = state
+            out[i : i + self.lanes] = found
+        return out
 
     def finish(self) -> None:
         """Checks that the stream was used up exactly.
@@ -110,5 +136,5 @@ class Decoder:
         Raises:
             FormatError: Words are left over or a state is not back at `LOW`.
         """
-        if self._next != len(self._words) or (self._state != LOW).any():
+        if self.used != len(self.words) or (self.states != LOW).any():
             raise FormatError("entropy-coded stream does not end where its symbols do")

@@ -1,4 +1,4 @@
-"""The compiled kernel (`_kernel.cpp`) behind ctypes: a fast engine for rendering and training.
+"""The compiled kernel (`_kernel.cpp`) behind ctypes: rendering, training, entropy decoding.
 
 It is optional: `available()` is false where the package was installed without a C++ compiler.
 """
@@ -8,11 +8,17 @@ from __future__ import annotations
 import ctypes as ct
 import functools
 import importlib.machinery
+import os
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from .errors import FormatError
+
+if TYPE_CHECKING:
+    from .entropy.rans import Decoder
 
 
 class Net(ct.Structure):
@@ -34,17 +40,39 @@ class Train(ct.Structure):
         ("net", Net),
         ("entries", Entries),
         ("n_codes", ct.c_int64),
-        *((n, ct.c_void_p) for n in ("first", "coverage", "target")),
+        *((n, ct.c_void_p) for n in ("first", "coverage", "learn", "target")),
         *((n, ct.c_void_p) for n in ("codes", "codes_m", "codes_v")),
         *((n, ct.c_void_p) for n in ("weights", "weights_m", "weights_v")),
+        *((n, ct.c_void_p) for n in ("prior_row", "prior_next", "prior_weight")),
+        ("n_prior", ct.c_int64),
         *((n, ct.c_void_p) for n in ("plane", "code_steps", "row_steps")),
         *((n, ct.c_int32) for n in ("code_max", "weight_max", "threads")),
     ]
 
 
+class Coded(ct.Structure):
+    """A coded array; mirrors `struct Coded`."""
+
+    _fields_ = [
+        ("words", ct.c_void_p),
+        ("n_words", ct.c_int64),
+        ("states", ct.c_void_p),
+        *((n, ct.c_int32) for n in ("lanes", "channels", "alphabet", "width")),
+        *((n, ct.c_void_p) for n in ("y", "x", "bounds")),
+        ("waves", ct.c_int64),
+        *((n, ct.c_int32) for n in ("scale_bits", "count_start", "count_step", "count_limit")),
+        ("known", ct.c_void_p),
+    ]
+
+
 @functools.cache
 def library() -> ct.CDLL | None:
-    """The loaded kernel, or None where it was not built or does not load on this machine."""
+    """The loaded kernel, or None where it was not built or does not load on this machine.
+
+    The environment variable PROXYIMG_NO_KERNEL switches it off: then all is numpy and torch.
+    """
+    if os.environ.get("PROXYIMG_NO_KERNEL"):
+        return None
     for suffix in importlib.machinery.EXTENSION_SUFFIXES:
         path = Path(__file__).with_name("_kernel" + suffix)
         if path.exists():
@@ -62,6 +90,8 @@ def library() -> ct.CDLL | None:
                 ct.POINTER(Net), ct.c_void_p, ct.c_void_p, ct.POINTER(Entries), ct.c_int64,
                 ct.c_void_p,
             ]  # fmt: skip
+            lib.pxi_decode.restype = ct.c_int64
+            lib.pxi_decode.argtypes = [ct.POINTER(Coded)]
             return lib
     return None
 
@@ -106,3 +136,43 @@ def forward(
         ct.byref(net), pointer(codes), pointer(weights), ct.byref(entries), len(base), pointer(out)
     )
     return out
+
+
+def decode(
+    decoder: Decoder,
+    known: NDArray[np.int16],
+    y: NDArray[np.int64],
+    x: NDArray[np.int64],
+    bounds: NDArray[np.int64],
+    alphabet: int,
+    adaptation: tuple[int, int, int],
+) -> None:
+    """Decodes symbols into `known` [H + 1, W + 2, C], as `entropy.arrays` does in numpy.
+
+    Args:
+        decoder: The stream.
+        known: -1 everywhere.
+        y: Rows of the positions, in coding order.
+        x: Columns.
+        bounds: First position of each wavefront, and the end.
+        alphabet: Number of symbols.
+        adaptation: Initial count, increment and limit of the counts.
+
+    Raises:
+        FormatError: The stream ends too early.
+    """
+    lib = library()
+    assert lib is not None, "check available() first"
+    words, states = decoder.words.astype(np.uint16), decoder.states.astype(np.uint32)
+    ys, xs = y.astype(np.int32), x.astype(np.int32)
+    task = Coded(
+        pointer(words), len(words), pointer(states),
+        decoder.lanes, known.shape[2], alphabet, known.shape[1] - 2,
+        pointer(ys), pointer(xs), pointer(bounds), len(bounds) - 1,
+        decoder.scale_bits, *adaptation, pointer(known),
+    )  # fmt: skip
+    used = lib.pxi_decode(ct.byref(task))
+    if used < 0:
+        raise FormatError("entropy-coded stream ends too early")
+    decoder.states[:] = states
+    decoder.used = used

@@ -1,4 +1,5 @@
-// Fused kernel of the implicit texture coder: gather -> encode -> MLP, forward and training.
+// Fused kernel of the implicit texture coder: gather -> encode -> MLP, forward and training; and
+// (in _kernel_decode.h) the entropy decoder.
 //
 // numpy (render) and torch (training) do the same arithmetic; this file is the fast engine and is
 // judged by them. Data is processed in blocks of BLOCK entries in structure-of-arrays layout
@@ -9,15 +10,17 @@
 // gradient buffers of their own, which are added in a fixed order.
 
 #include <algorithm>
-#include <barrier>
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <thread>
 #include <vector>
 
+#include "_kernel_decode.h"
+
 typedef float vec __attribute__((vector_size(64)));
-static const int LANES = 16, BLOCK = 256, NV = BLOCK / LANES, PARTS = 4, MAX_LAYERS = 10;
+static const int LANES = 16, BLOCK = 256, NV = BLOCK / LANES, PARTS = 4, MAX_LAYERS = 10, SPAN = 32;
 static const float PI = 3.14159265358979f;
 
 extern "C" {
@@ -34,9 +37,14 @@ struct Train {
     int64_t n_codes;
     const int32_t *first;     // [pixels + 1] range of entries of each pixel, front to back
     const float *coverage;    // [entries]
+    const float *learn;       // [entries] factor of the entry's gradient
     const float *target;      // [pixels][channels], premultiplied
     float *codes, *codes_m, *codes_v;      // [n_codes][dim] and Adam moments
     float *weights, *weights_m, *weights_v;
+    const int32_t *prior_row;     // [n_prior] codes with a smoothness prior
+    const int32_t *prior_next;    // [n_prior][4] their neighbours
+    const float *prior_weight;    // [n_prior]
+    int64_t n_prior;
     const uint8_t *plane;     // [n_codes] which row of code_steps
     const float *code_steps;  // [planes][dim]; used when code_max > 0
     const float *row_steps;   // one per output row of the network
@@ -151,6 +159,21 @@ inline void sincospi(const float *x, float *s, float *c, int n) {
     }
 }
 
+// Gradients of one slice of a batch. Codes come in spans of SPAN rows, and only spans that were
+// touched are cleared and added: batches are sorted, so a slice touches few of them.
+struct Gradients {
+    std::vector<float> codes, weights;
+    std::vector<uint8_t> touched;
+    double loss = 0;
+    void touch(int64_t first, int64_t last) { touched[first / SPAN] = touched[last / SPAN] = 1; }
+    void clear(int64_t width) {
+        for (size_t s = 0; s < touched.size(); s++)
+            if (touched[s]) std::fill_n(codes.begin() + s * width, width, 0.f), touched[s] = 0;
+        std::fill(weights.begin(), weights.end(), 0.f);
+        loss = 0;
+    }
+};
+
 struct Block {  // the working memory of one thread
     const Net net;
     const Layout lay;
@@ -221,15 +244,17 @@ struct Block {  // the working memory of one thread
         }
     }
 
-    void scatter(float *g_codes, const Entries &e, const int32_t *index, int n) {
+    void scatter(Gradients &g, const Entries &e, const int32_t *index, int n) {
         const int D = net.dim;
         for (int p = 0; p < n; p++) {
             int64_t k = index[p];
-            float *a = g_codes + (int64_t)e.base[k] * D, *b = a + (int64_t)e.stride[k] * D;
+            g.touch(e.base[k], e.base[k] + 1);
+            g.touch(e.base[k] + e.stride[k], e.base[k] + e.stride[k] + 1);
+            float *a = g.codes.data() + (int64_t)e.base[k] * D, *b = a + (int64_t)e.stride[k] * D;
             float x = e.fx[k], y = e.fy[k], w11 = x * y, w10 = x - w11, w01 = y - w11, w00 = 1 - x - w01;
             for (int d = 0; d < D; d++) {
-                float g = d_feature.p[d * BLOCK + p];
-                a[d] += w00 * g, a[D + d] += w10 * g, b[d] += w01 * g, b[D + d] += w11 * g;
+                float v = d_feature.p[d * BLOCK + p];
+                a[d] += w00 * v, a[D + d] += w10 * v, b[d] += w01 * v, b[D + d] += w11 * v;
             }
         }
     }
@@ -237,7 +262,8 @@ struct Block {  // the working memory of one thread
 
 // Composites the entries of one pixel and turns the squared error into gradients of the outputs.
 // Back to front: R_k = c_k p_k + (1 - c_k a_k) R_{k+1}, with a_k = 1 where the file has no alpha.
-double composite_loss(Block &b, const float *coverage, const float *target, int at, int n, float scale) {
+double composite_loss(Block &b, const float *coverage, const float *learn, const float *target, int at,
+                      int n, float scale) {
     const int C = b.net.channels;
     const bool alpha = C == 4;
     float behind[64][4], through[64], out[4] = {0, 0, 0, 0};
@@ -266,20 +292,14 @@ double composite_loss(Block &b, const float *coverage, const float *target, int 
             hidden += g[c] * behind[k][c];
         }
         if (alpha) d[3 * BLOCK + at + k] -= w * hidden;
+        for (int c = 0; c < C; c++) d[c * BLOCK + at + k] *= learn[k];
     }
     return loss;
 }
 
-struct Gradients {
-    std::vector<float> codes, weights;
-    double loss = 0;
-};
-
 void train_slice(const Train &t, Block &b, const float *codes, const float *weights, const int32_t *pixels,
                  int64_t n, float scale, Gradients &g) {
-    std::fill(g.codes.begin(), g.codes.end(), 0.f);
-    std::fill(g.weights.begin(), g.weights.end(), 0.f);
-    g.loss = 0;
+    g.clear((int64_t)SPAN * t.net.dim);
     int32_t index[BLOCK];
     for (int64_t i = 0; i < n;) {
         int filled = 0;
@@ -294,14 +314,48 @@ void train_slice(const Train &t, Block &b, const float *codes, const float *weig
         std::memset(b.d_a.p, 0, sizeof(float) * t.net.channels * BLOCK);
         for (int at = 0; i < j; i++) {
             int32_t a = t.first[pixels[i]], count = t.first[pixels[i] + 1] - a;
-            g.loss += composite_loss(b, t.coverage + a, t.target + (int64_t)pixels[i] * t.net.channels, at,
-                                     count, scale);
+            g.loss += composite_loss(b, t.coverage + a, t.learn + a,
+                                     t.target + (int64_t)pixels[i] * t.net.channels, at, count, scale);
             at += count;
         }
         b.backward(weights, g.weights.data());
-        b.scatter(g.codes.data(), t.entries, index, filled);
+        b.scatter(g, t.entries, index, filled);
     }
 }
+
+// Gradient of weight / 2 * |code - mean of its neighbours|^2, the mean taken as given.
+void add_prior(const Train &t, int64_t from, int64_t to, Gradients &g) {
+    const int D = t.net.dim;
+    for (int64_t k = from; k < to; k++) {
+        const int32_t *next = t.prior_next + 4 * k;
+        int64_t row = (int64_t)t.prior_row[k] * D;
+        g.touch(t.prior_row[k], t.prior_row[k]);
+        for (int d = 0; d < D; d++) {
+            float sum = 0;
+            for (int n = 0; n < 4; n++) sum += t.codes[(int64_t)next[n] * D + d];
+            g.codes[row + d] += t.prior_weight[k] * (t.codes[row + d] - sum / 4);
+        }
+    }
+}
+
+// Threads meet twice a step, every millisecond or less: sleeping would cost more than the work.
+class Barrier {
+    std::atomic<int> waiting{0}, round{0};
+    const int threads;
+
+  public:
+    explicit Barrier(int n) : threads(n) {}
+    void wait() {
+        int now = round.load();
+        if (waiting.fetch_add(1) + 1 == threads) {
+            waiting.store(0);
+            round.store(now + 1);
+            return;
+        }
+        for (int spins = 0; round.load() == now; spins++)
+            if (spins > 2000) std::this_thread::yield();
+    }
+};
 
 struct Rate {
     float lr, c1, c2;
@@ -341,6 +395,8 @@ void quantize_weights(const Train &t, const Layout &lay, float *out) {
 
 extern "C" {
 
+int64_t pxi_decode(const Coded *stream) { return decode_symbols(*stream); }
+
 // Runs `steps` Adam steps; `pixels` is [steps][batch]. Returns the mean loss of the steps.
 double pxi_train(const Train *task, const int32_t *pixels, int64_t steps, int64_t batch, int64_t done,
                  const float *lr_codes, const float *lr_weights) {
@@ -350,14 +406,18 @@ double pxi_train(const Train *task, const int32_t *pixels, int64_t steps, int64_
     const float scale = 2.f / (t.net.channels * batch);
     std::vector<float> q_codes(t.code_max ? rows * D : 0), q_weights(lay.total);
     Gradients parts[PARTS];
-    for (auto &g : parts) g.codes.resize(rows * D), g.weights.resize(lay.total);
+    const int64_t spans = (rows + SPAN - 1) / SPAN;
+    for (auto &g : parts) {
+        g.codes.resize(spans * SPAN * D), g.weights.resize(lay.total);
+        g.touched.assign(spans, 0);
+    }
     const float *codes = t.code_max ? q_codes.data() : t.codes;
     const float *weights = t.weight_max ? q_weights.data() : t.weights;
     if (t.code_max) quantize_codes(t, q_codes.data(), 0, rows);
     if (t.weight_max) quantize_weights(t, lay, q_weights.data());
 
     const int threads = std::clamp(t.threads, 1, PARTS);
-    std::barrier<> sync(threads);
+    Barrier sync(threads);
     double loss = 0;
     auto work = [&](int id) {
         Block block(t.net);
@@ -366,18 +426,22 @@ double pxi_train(const Train *task, const int32_t *pixels, int64_t steps, int64_
             for (int p = id; p < PARTS; p += threads) {
                 int64_t a = batch * p / PARTS, z = batch * (p + 1) / PARTS;
                 train_slice(t, block, codes, weights, px + a, z - a, scale, parts[p]);
+                add_prior(t, t.n_prior * p / PARTS, t.n_prior * (p + 1) / PARTS, parts[p]);
             }
-            sync.arrive_and_wait();
+            sync.wait();
             float step = (float)(done + s + 1);
             Rate rc{lr_codes[s], 1 / (1 - std::pow(.9f, step)), 1 / (1 - std::pow(.99f, step))}, rw = rc;
             rw.lr = lr_weights[s];
-            int64_t from = rows * id / threads, to = rows * (id + 1) / threads;
-            for (int64_t i = from * D; i < to * D; i++) {
-                float g = parts[0].codes[i];
-                for (int p = 1; p < PARTS; p++) g += parts[p].codes[i];
-                t.codes[i] = adam(t.codes[i], g, t.codes_m[i], t.codes_v[i], rc);
+            for (int64_t span = spans * id / threads; span < spans * (id + 1) / threads; span++) {
+                int64_t from = span * SPAN, to = std::min(from + SPAN, rows), n = (to - from) * D;
+                float g[SPAN * 64] = {};
+                for (auto &part : parts)
+                    if (part.touched[span])
+                        for (int64_t i = 0; i < n; i++) g[i] += part.codes[from * D + i];
+                float *c = t.codes + from * D, *m = t.codes_m + from * D, *v = t.codes_v + from * D;
+                for (int64_t i = 0; i < n; i++) c[i] = adam(c[i], g[i], m[i], v[i], rc);
+                if (t.code_max) quantize_codes(t, q_codes.data(), from, to);
             }
-            if (t.code_max) quantize_codes(t, q_codes.data(), from, to);
             if (id == 0) {
                 for (int i = 0; i < lay.total; i++) {
                     float g = parts[0].weights[i];
@@ -387,7 +451,7 @@ double pxi_train(const Train *task, const int32_t *pixels, int64_t steps, int64_
                 for (auto &g : parts) loss += g.loss;
                 if (t.weight_max) quantize_weights(t, lay, q_weights.data());
             }
-            sync.arrive_and_wait();
+            sync.wait();
         }
     };
     std::vector<std::thread> pool;

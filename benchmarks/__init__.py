@@ -1,0 +1,1 @@
+"""Slow measurements; see the README for how to run them."""

@@ -1,0 +1,91 @@
+"""What the benchmarks share: pictures, crops, and saying what was run on what."""
+
+from __future__ import annotations
+
+import platform
+import resource
+import subprocess
+import sys
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxyimg_codec import pictures
+
+Pixels = NDArray[Any]
+
+
+def header(data: Path) -> str:
+    """Command, versions, data and machine."""
+    parts = [f"$ python -m {Path(sys.argv[0]).parent.name}.{Path(sys.argv[0]).stem} "
+             + " ".join(sys.argv[1:])]  # fmt: skip
+    for name in ("proxyimg-codec", "numpy", "torch", "onnxruntime"):
+        try:
+            parts.append(f"{name} {version(name)}")
+        except PackageNotFoundError:
+            parts.append(f"{name} absent")
+    parts += [f"Python {platform.python_version()}", f"data {data.resolve().name}", machine()]
+    return "; ".join(parts)
+
+
+def machine() -> str:
+    """Processor and cores."""
+    import os
+
+    model = platform.processor() or platform.machine()
+    info = Path("/proc/cpuinfo")
+    if info.exists():
+        names = [v for v in info.read_text().splitlines() if v.startswith("model name")]
+        model = names[0].split(":")[1].strip() if names else model
+    return f"{model}, {os.cpu_count()} cores"
+
+
+def kodak(data: Path) -> list[Path]:
+    """The 24 pictures, sorted."""
+    files = sorted((data / "kodak").glob("kodim*.png"))
+    if len(files) != 24:
+        sys.exit(f"{data / 'kodak'}: expected kodim01.png .. kodim24.png")
+    return files
+
+
+def read_rgb(path: Path) -> Pixels:
+    """uint8 [H, W, 3]."""
+    return np.ascontiguousarray(pictures.read(path).pixels[..., :3])
+
+
+def centre_crop(pixels: Pixels, size: int = 512) -> Pixels:
+    """The central size x size part."""
+    y, x = ((n - size) // 2 for n in pixels.shape[:2])
+    return np.ascontiguousarray(pixels[y : y + size, x : x + size])
+
+
+def one_thread() -> None:
+    """Keeps array libraries on one thread; call before they are first used for work."""
+    import os
+
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ[name] = "1"
+
+
+def run_limited(code: str, threads: int | None = None) -> tuple[str, float, float]:
+    """Runs Python code in a child; its output, peak memory in GB, and CPU seconds."""
+    import os
+
+    env = dict(os.environ)
+    if threads:
+        env |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), str(threads))
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    script = (
+        code + "\nimport resource; "
+        "print('PEAK', resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6)"
+    )
+    done = subprocess.run([sys.executable, "-c", script], env=env, text=True, capture_output=True)
+    if done.returncode:
+        sys.exit(done.stderr)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    text, peak = done.stdout.rsplit("PEAK", 1)
+    return text.strip(), float(peak), cpu
