@@ -377,7 +377,13 @@ void quantize_codes(const Train &t, float *out, int64_t from, int64_t to) {
     const int D = t.net.dim;
     for (int64_t i = from; i < to; i++) {
         const float *step = t.code_steps + t.plane[i] * D;
-        for (int d = 0; d < D; d++) out[i * D + d] = round_to(t.codes[i * D + d], step[d], t.code_max);
+        for (int d = 0; d < D; d++) {
+            // Kept near the range, so that a clamped code can come back.
+            float low = -(t.code_max + 1.5f) * step[d], high = (t.code_max + .5f) * step[d];
+            float &code = t.codes[i * D + d];
+            code = std::clamp(code, low, high);
+            out[i * D + d] = round_to(code, step[d], t.code_max);
+        }
     }
 }
 

@@ -260,7 +260,8 @@ def _encode_oiio(kind: str, pixels: Pixels, blocks: dict[str, bytes]) -> bytes:
         good = good and target.write_image(np.ascontiguousarray(pixels)) and target.close()
         # Some writers report success and leave a stump.
         if not good or oiio.ImageInput.open(name) is None:
-            problem = (target.geterror() or oiio.geterror() or "unknown reason").splitlines()[0]
+            problem = f"{target.geterror()}\n{oiio.geterror()}".strip() or "unknown reason"
+            problem = problem.splitlines()[0]
             raise UnsupportedError(f"{kind} cannot hold this picture: {problem}")
         return Path(name).read_bytes()
 

@@ -46,6 +46,10 @@ def run(prog: str, work: Callable[[], None]) -> int:
     except BrokenPipeError:
         # The reader of our output has gone; there is nobody left to tell.
         code, message = 3, ""
+    except ModuleNotFoundError as error:
+        if (error.name or "").startswith("proxyimg_codec"):
+            raise
+        code, message = 5, f"this needs {error.name}: pip install 'proxyimg-codec[all]'"
     except OSError as error:
         place = "" if error.filename is None else f"{error.filename}: "
         code, message = 3, f"{place}{error.strerror or error}"

@@ -21,7 +21,7 @@ from .problem import Problem
 LR_CODES, LR_NET = 1.2e-2, 8e-3
 """Peak learning rates of the float phase."""
 
-QAT_LR_CODES, QAT_LR_NET = 2e-2, 1e-2
+QAT_LR_CODES, QAT_LR_NET = 1.2e-2, 6e-3
 """Peak learning rates with quantization in the loop."""
 
 STEP_SCALE = 0.7

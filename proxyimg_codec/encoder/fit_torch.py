@@ -75,6 +75,10 @@ class TorchTrainer:
             self._adam.zero_grad(set_to_none=True)
             loss.backward()
             self._adam.step()
+            if steps is not None:
+                top = (1 << (state.code_bits - 1)) - 1
+                with torch.no_grad():  # kept near the range, so that a clamped code can come back
+                    self._parameters[0].clamp_(-(top + 1.5) * steps, (top + 0.5) * steps)
             total += float(loss.detach())
         for array, p in zip((state.codes, *flat), self._parameters, strict=True):
             array[...] = p.detach().cpu().numpy()
