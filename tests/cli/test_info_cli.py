@@ -1,0 +1,126 @@
+"""pxi-info: what it says, and how little it needs; and what other light paths import."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import proxyimg_codec as pxi
+
+ROOT = Path(__file__).parents[2]
+HEAVY = {"torch", "cv2", "onnx", "onnxruntime", "OpenImageIO", "tqdm"}
+
+
+def test_json(tool, small_pxi, small_masks):
+    facts = json.loads(tool("info", small_pxi, "--json").out)
+    assert (facts["width"], facts["height"], facts["alpha"], facts["depth"]) == (64, 48, False, 8)
+    assert facts["bytes"] == small_pxi.stat().st_size
+    assert facts["bpp"] == pytest.approx(8 * facts["bytes"] / (64 * 48), abs=1e-4)
+    back, bar, disc = facts["layers"]
+    assert [v["name"] for v in (back, bar, disc)] == ["back", "bar", "disc"]
+    assert (back["box"], back["segments"]) == ([0, 0, 64, 48], 0)
+    for layer in (bar, disc):
+        assert layer["area"] == pytest.approx(small_masks[layer["name"]].sum(), rel=0.05)
+        assert layer["segments"] >= 2
+    hidden = sum(mask.sum() for mask in small_masks.values())
+    assert 0.95 * (64 * 48 - hidden) < back["area"] < 64 * 48
+    assert facts["settings"]["effort"] == 1
+    assert facts["encoder"].startswith("proxyimg-codec ")
+    signature_and_version = 12
+    assert sum(facts["chunk_bytes"].values()) + signature_and_version == facts["bytes"]
+    parts = [v["boundary_bytes"] + v["texture_bytes"] for v in facts["layers"]]
+    parts += [n["bytes"] for n in facts["networks"]]
+    assert 0 < sum(parts) < facts["bytes"]
+
+
+def test_text(tool, small_pxi):
+    out = tool("info", small_pxi).out.decode()
+    for part in ("64x48", "opaque", "layer 0 'back'", "layer 2 'disc'", "network 0", "effort"):
+        assert part in out
+    assert tool("info", "-", stdin=small_pxi.read_bytes()).out.decode() == out
+
+
+def test_hostile_texts_cannot_write_to_the_terminal(tool, small_pxi, tmp_path):
+    image = pxi.open(small_pxi)
+    path = tmp_path / "a.pxi"
+    info = {**image.info, "encoder": "\x1b[2Jme", "settings": "[" * 60000}
+    layers = [replace(v, name=f"{v.name}\x1b[2J\n") for v in image.layers]
+    replace(image, info=info, layers=type(image.layers)(layers)).save(path)
+    out = tool("info", path).out
+    assert b"\x1b" not in out
+    assert b"me" in out
+    facts = json.loads(tool("info", path, "--json").out)
+    assert facts["settings"] is None
+    assert facts["encoder"] == "\x1b[2Jme"
+
+
+@pytest.mark.parametrize("flags", [(), ("--json",)])
+def test_names_that_the_terminal_cannot_show(launch, small_pxi, tmp_path, flags):
+    image = pxi.open(small_pxi)
+    layers = [replace(v, name=f"{v.name} \u732b") for v in image.layers]
+    replace(image, layers=type(image.layers)(layers)).save(tmp_path / "a.pxi")
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
+    out = launch("info", tmp_path / "a.pxi", *flags, env=environment).out
+    assert b"\\u732b" in out
+
+
+def test_usage(tool, small_pxi):
+    tool("info", code=2)
+    tool("info", small_pxi, "--scale", "2", code=2)
+    assert tool("info", "--version").out.startswith(b"pxi-info ")
+
+
+def imported(script: str, *args) -> set[str]:
+    """Top-level modules that a script imports."""
+    around = f"import sys; old = set(sys.modules); {script}; new = set(sys.modules) - old; "
+    around += "print('|'.join({m.partition('.')[0] for m in new}), file=sys.stderr)"
+    ran = subprocess.run(
+        [sys.executable, "-c", around, *map(str, args)], capture_output=True, timeout=60, cwd=ROOT
+    )
+    assert ran.returncode == 0, ran.stderr.decode()
+    return set(ran.stderr.decode().splitlines()[-1].split("|"))
+
+
+def test_imports_of_the_package():
+    modules = imported("import proxyimg_codec")
+    assert "proxyimg_codec" in modules
+    assert not modules & (HEAVY | {"numpy"})
+
+
+def test_imports_of_info(small_pxi):
+    script = "from proxyimg_codec.cli.info import main; main([sys.argv[1]])"
+    modules = imported(script, small_pxi) - set(sys.stdlib_module_names)
+    modules = {m for m in modules if "cython" not in m}
+    assert modules <= {"proxyimg_codec", "msgpack", "zstandard", "_cffi_backend", "cffi"}
+
+
+@pytest.mark.parametrize("suffix", [".png", ".ppm", ".npy"])
+def test_imports_of_decoding(small_pxi, tmp_path, suffix):
+    script = "from proxyimg_codec.cli.decode import main; "
+    script += "main([sys.argv[1], sys.argv[2], '--engine', 'numpy', '--quiet'])"
+    modules = imported(script, small_pxi, tmp_path / f"a{suffix}")
+    assert "numpy" in modules
+    assert not modules & HEAVY
+    assert (tmp_path / f"a{suffix}").exists()
+
+
+def test_info_starts_fast(small_pxi):
+    """Less than 0.15 s above the bare interpreter, comparing the best of several runs."""
+
+    def seconds(*args) -> float:
+        start = time.perf_counter()
+        subprocess.run([sys.executable, *args], check=True, capture_output=True, cwd=ROOT)
+        return time.perf_counter() - start
+
+    bare, info = [], []
+    for i in range(20):
+        bare.append(seconds("-c", "pass"))
+        info.append(seconds("-m", "proxyimg_codec.cli.info", str(small_pxi)))
+        if i >= 4 and min(info) - min(bare) < 0.15:
+            break
+    assert min(info) - min(bare) < 0.15

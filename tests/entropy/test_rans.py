@@ -1,0 +1,93 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from proxyimg_codec.entropy.rans import LOW, SCALE_BITS, Decoder, Encoder
+from proxyimg_codec.errors import FormatError
+
+TOTAL = 1 << SCALE_BITS
+
+
+def cumulative(weights):
+    weights = np.asarray(weights, np.int64)
+    freq = (TOTAL - len(weights)) * weights // weights.sum() + 1
+    freq[-1] += TOTAL - freq.sum()
+    return np.concatenate([[0], np.cumsum(freq)])
+
+
+def code(symbols, cdf, lanes_log2, waves=1):
+    encoder = Encoder(lanes_log2)
+    for part in np.array_split(symbols, waves):
+        encoder.put(cdf[part], cdf[part + 1] - cdf[part])
+    return encoder.finish()
+
+
+def decode(data, cdf, counts):
+    decoder = Decoder(data)
+    rows = [decoder.symbols(np.tile(cdf, (n, 1))) for n in counts]
+    decoder.finish()
+    return np.concatenate(rows)
+
+
+@given(
+    st.lists(st.integers(0, 1000), min_size=2, max_size=16),
+    st.integers(0, 400),
+    st.integers(0, 6),
+    st.integers(0, 2**32 - 1),
+)
+def test_symbols_come_back(weights, n, lanes_log2, seed):
+    cdf = cumulative(np.add(weights, 1))
+    symbols = np.random.default_rng(seed).integers(0, len(weights), n)
+    data = code(symbols, cdf, lanes_log2, waves=3)
+    counts = [len(p) for p in np.array_split(symbols, 3)]
+    assert (decode(data, cdf, counts) == symbols).all()
+
+
+def test_size_is_close_to_the_entropy():
+    rng = np.random.default_rng(0)
+    weights = np.array([1, 2, 4, 8, 16, 32, 64, 128])
+    symbols = rng.choice(8, 20000, p=weights / weights.sum())
+    cdf = cumulative(weights)
+    ideal = -np.log2(np.diff(cdf)[symbols] / TOTAL).sum() / 8
+    assert ideal < len(code(symbols, cdf, 3)) < ideal * 1.002 + 5 + 4 * 8
+
+
+def test_one_symbol_alphabet_costs_only_the_states():
+    cdf = np.array([0, TOTAL])
+    assert len(code(np.zeros(1000, np.int64), cdf, 0)) == 1 + 4 + 4
+
+
+def test_known_stream():
+    """The bytes of a small stream are part of the format."""
+    cdf = cumulative([1, 1, 1, 1])
+    data = code(np.array([0, 1, 2, 3, 3, 2, 1, 0, 0, 0]), cdf, 1)
+    assert data.hex() == KNOWN_STREAM
+
+
+KNOWN_STREAM = "010080070400d0020400000000"
+
+
+@pytest.mark.parametrize("cut", [0, 1, 4, 8, -1])
+def test_truncation_is_found(cut):
+    cdf = cumulative([1, 3])
+    data = code(np.arange(4000) % 2, cdf, 1)
+    with pytest.raises(FormatError):
+        decode(data[:cut], cdf, [4000])
+
+
+def test_too_few_symbols_read_is_found():
+    cdf = cumulative([1, 3])
+    data = code(np.ones(100, np.int64), cdf, 0)
+    decoder = Decoder(data)
+    decoder.symbols(np.tile(cdf, (99, 1)))
+    with pytest.raises(FormatError, match="does not end"):
+        decoder.finish()
+
+
+def test_states_end_where_they_began():
+    cdf = cumulative([5, 1, 1])
+    symbols = np.random.default_rng(1).integers(0, 3, 500)
+    decoder = Decoder(code(symbols, cdf, 2))
+    decoder.symbols(np.tile(cdf, (500, 1)))
+    assert (decoder.states == LOW).all()
