@@ -60,4 +60,9 @@ def __getattr__(name: str) -> Any:
     if name not in _LAZY:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     module, attribute = _LAZY[name]
-    return getattr(importlib.import_module(f".{module}", __name__), attribute)
+    try:
+        return getattr(importlib.import_module(f".{module}", __name__), attribute)
+    except ModuleNotFoundError as error:
+        raise UnsupportedError(
+            f"{name} needs {error.name}: pip install 'proxyimg-codec[encode]'"
+        ) from None

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .container import file as container
 from .container.chunks import Chunk
-from .errors import UsageError
+from .errors import PxiError, UsageError
 from .files import read_bytes, write_atomically
 from .geometry import boundary as boundaries
 from .geometry.boundary import Boundary
@@ -157,11 +157,14 @@ class Image:
 
     def _select(self, layers: Sequence[str | int] | None, background: bool) -> list[Layer]:
         wanted = list(self.layers) if layers is None else [self.layers[k] for k in layers]
-        return [
+        chosen = [
             layer
             for i, layer in enumerate(self.layers)
             if any(layer is w for w in wanted) and (background or i > 0 or not self.opaque)
         ]
+        if not chosen:
+            raise UsageError("no layer is left to draw")
+        return chosen
 
     def to_bytes(self) -> bytes:
         """The picture as a `.pxi` file."""
@@ -247,4 +250,9 @@ def open_image(path: str | os.PathLike[str], limits: Limits = DEFAULT_LIMITS) ->
         InputError: The file cannot be read.
         FormatError, UnsupportedError, LimitError: As `from_bytes`.
     """
-    return from_bytes(read_bytes(path), limits)
+    data = read_bytes(path)
+    try:
+        return from_bytes(data, limits)
+    except PxiError as error:
+        error.args = (f"{os.fspath(path)}: {error}",)
+        raise

@@ -63,6 +63,7 @@ def encode(
             settings = replace(settings, **options)
         except TypeError as error:
             raise UsageError(f"encode: {error}") from None
+    pixels = np.asarray(pixels)
     report = progress or (lambda stage, done, total: None)
     picture, depth = to_float(pixels)
     report("layers", 0, 1)
@@ -75,6 +76,8 @@ def encode(
     premultiplied[..., :3] *= picture[..., 3:]
     outlines = [layer.boundary for layer in plan.layers]
     problem = build(premultiplied, outlines, shape, settings.spacing)
+    if (problem.target == problem.target[0]).all():
+        problem = build(premultiplied, outlines, NetShape(1, 0, 1, 1, plan.channels), np.inf)
     state, stored = _fit(problem, settings, report)
     network, textures = assemble(problem, state, stored, settings)
     info = {

@@ -73,7 +73,7 @@ class TorchTrainer:
                 ]
             loss = self._loss(codes, net, batch)
             self._adam.zero_grad(set_to_none=True)
-            loss.backward()
+            (loss + self._smoothness(self._parameters[0])).backward()
             self._adam.step()
             if steps is not None:
                 top = (1 << (state.code_bits - 1)) - 1
@@ -111,10 +111,13 @@ class TorchTrainer:
             result = result.index_add(0, pixel, weight[:, None] * p)
             alpha = p[:, 3].clamp(0, 1) if p.shape[1] == 4 else 1.0
             clear = clear.index_copy(0, pixel, clear[pixel] * (1 - c * alpha))
-        loss = ((result - self._target[batch]) ** 2).mean()
+        return ((result - self._target[batch]) ** 2).mean()
+
+    def _smoothness(self, codes: Any) -> Any:
+        """Half the weighted squared distance of little known codes from their neighbours."""
         row, neighbours, weight = self._prior
         off = codes[row] - codes[neighbours].mean(1).detach()
-        return loss + (weight[:, None] * off**2).sum() / 2
+        return (weight[:, None] * off**2).sum() / 2
 
 
 def interpolate(codes: Any, base: Any, stride: Any, fx: Any, fy: Any) -> Any:

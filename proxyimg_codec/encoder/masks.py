@@ -58,7 +58,7 @@ def load_masks(path: str | Path, width: int, height: int) -> list[Region]:
     files = sorted((f for f in path.iterdir() if f.suffix.lower() == ".png"), key=_stack_order)
     if not files:
         raise InputError(f"{path}: the mask folder holds no PNG file; put one mask a layer in it")
-    return [Region(f.stem, _binary(_read(f, width, height))) for f in files]
+    return [Region(_name(f), _binary(_read(f, width, height))) for f in files]
 
 
 def resolve(
@@ -167,6 +167,11 @@ def _colour_word(rgb: NDArray[np.float32]) -> str:
     hue = float(np.degrees(np.arctan2(b, a))) % 360
     word = next(word for top, word in _HUES if hue <= top)
     return "brown" if word == "orange" and light < 50 else word
+
+
+def _name(file: Path) -> str:
+    """The file's stem as valid Unicode, short enough for the format."""
+    return file.stem.encode("utf-8", "replace").decode()[:200]
 
 
 def _is_back(region: Region) -> bool:

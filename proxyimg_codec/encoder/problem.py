@@ -127,15 +127,18 @@ def build(
         start = planes[-1].start + planes[-1].size if planes else 0
         planes.append(plane_for(boundary, width, height, spacing, start))
 
-    clear = np.ones(height * width, bool)
+    clear = np.ones(height * width, np.float32)
     rim = np.zeros(height * width, bool)
+    # Where a front layer is translucent, those behind show through and learn together with it.
+    solid = picture[..., 3].ravel() == 1 if shape.channels == 4 else np.True_
     seen: list[NDArray[np.int64]] = []
     parts: list[tuple[NDArray[Any], ...]] = []
     areas = [0] * len(planes)
     for k in range(len(planes) - 1, -1, -1):
         covered = _coverage(boundaries[k], width, height)
-        at = np.flatnonzero((covered > 0) & clear)
-        areas[k] = int((covered[at].astype(np.int64)).sum() / cover.FULL + 0.5)
+        at = np.flatnonzero((covered > 0) & (clear > 0))
+        share = covered.astype(np.float32) / cover.FULL
+        areas[k] = round(float((share[at] * clear[at]).sum(dtype=np.float64)))
         plane = planes[k]
         t = taps(at % width + 0.5, at // width + 0.5, plane.box, plane.columns, plane.rows)
         seen.append(at)
@@ -145,13 +148,13 @@ def build(
                 np.full(len(at), t.stride, np.int32),
                 t.fx,
                 t.fy,
-                covered[at].astype(np.float32) / cover.FULL,
+                share[at],
                 np.where(rim[at], 0, 1).astype(np.float32),
             )
         )
-        # With alpha, what lies behind may show through; the picture does not say how much.
-        clear &= covered < cover.FULL
-        rim |= covered > 0
+        hides = share * solid
+        clear *= 1 - hides
+        rim |= hides > 0
     pixel = np.concatenate(seen)
     order = np.argsort(pixel, kind="stable")
     ids, counts = np.unique(pixel, return_counts=True)

@@ -62,6 +62,9 @@ class Settings:
             (self.jobs >= 1, "jobs", "at least 1"),
             (self.device in ("cpu", "cuda"), "device", "cpu or cuda"),
         ]
+        for name in ("effort", "max_layers", "net_bits", "seed", "jobs"):
+            if not isinstance(getattr(self, name), int):
+                raise UsageError(f"{name} must be an integer")
         for good, name, allowed in checks:
             if not good:
                 raise UsageError(f"{name} is {getattr(self, name)}, but must be {allowed}")

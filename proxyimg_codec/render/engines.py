@@ -18,17 +18,22 @@ from ..texture.network import Floats, Network
 
 Engine = Callable[[ImplicitTexture, Network, Taps], Floats]
 
-_CHUNK = 8192
+_CHUNK = 4096
 """Points at a time: the encoded features then stay in the cache."""
 
 
 def run_numpy(texture: ImplicitTexture, network: Network, taps: Taps) -> Floats:
     """Plain numpy."""
     out = np.empty((len(taps.base), network.shape.channels), np.float32)
+    # Matrix products round differently for different sizes. All have one size, so that a point's
+    # colour does not depend on which others are asked for.
+    features = np.zeros((_CHUNK, network.shape.dim), np.float32)
     for i in range(0, len(out), _CHUNK):
         at = slice(i, i + _CHUNK)
         part = Taps(taps.base[at], taps.fx[at], taps.fy[at], taps.stride)
-        out[at] = network(texture.features(part))
+        count = len(part.base)
+        features[:count] = texture.features(part)
+        out[at] = network(features)[:count]
     return out
 
 
@@ -52,8 +57,8 @@ def run_ort(texture: ImplicitTexture, network: Network, taps: Taps) -> Floats:
 
     run = session(network)
     out = np.empty((len(taps.base), network.shape.channels), np.float32)
-    for i in range(0, len(out), 2 * _CHUNK):
-        at = slice(i, i + 2 * _CHUNK)
+    for i in range(0, len(out), 4 * _CHUNK):
+        at = slice(i, i + 4 * _CHUNK)
         part = Taps(taps.base[at], taps.fx[at], taps.fy[at], taps.stride)
         out[at] = run(texture.features(part))
     return out

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import UsageError
+from ..errors import LimitError, UsageError
+
+SIDE_MAX = 1 << 24
+"""Most output columns or rows; keeps fixed-point coordinates within 64 bits."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +72,7 @@ def make_view(
 
     Raises:
         UsageError: Contradictory, empty or non-finite request, or a region outside the canvas.
+        LimitError: More than `SIDE_MAX` columns or rows.
     """
     x, y, w, h = region or (0, 0, *canvas)
     if w < 1 or h < 1 or x < 0 or y < 0 or x + w > canvas[0] or y + h > canvas[1]:
@@ -79,15 +84,20 @@ def make_view(
             raise UsageError("give either a scale or a width and height")
         if not (np.isfinite(scale) and scale > 0):
             raise UsageError(f"scale {scale} is not a positive number")
+        if scale * max(w, h) > SIDE_MAX:
+            raise LimitError(
+                f"scale {scale:g} makes a picture of more than {SIDE_MAX} pixels a side"
+            )
         width, height = max(round(w * scale), 1), max(round(h * scale), 1)
     if width is None and height is None:
         width, height = w, h
     elif width is None:
-        assert height is not None
-        width = max(round(w * height / h), 1)
+        width = max(round(Fraction(w * (height or 0), h)), 1)
     elif height is None:
-        height = max(round(h * width / w), 1)
+        height = max(round(Fraction(h * width, w)), 1)
     assert height is not None
     if width < 1 or height < 1:
         raise UsageError(f"output size {width}x{height} is empty")
+    if max(width, height) > SIDE_MAX:
+        raise LimitError(f"the output would have more than {SIDE_MAX} pixels a side")
     return View(x, y, w, h, width, height)

@@ -96,13 +96,13 @@ def test_number_of_labels_is_limited(tmp_path, count):
 def test_unusable_paths_are_refused_by_name(tmp_path):
     with pytest.raises(InputError, match="holds no PNG"):
         load_masks(tmp_path, 8, 6)
-    with pytest.raises(InputError, match="missing.png: cannot read"):
+    with pytest.raises(InputError, match=r"missing.png: cannot read"):
         load_masks(tmp_path / "missing.png", 8, 6)
     (tmp_path / "text.png").write_text("hello")
-    with pytest.raises(InputError, match="text.png: the mask is not a valid PNG"):
+    with pytest.raises(InputError, match=r"text.png: the mask is not a valid PNG"):
         load_masks(tmp_path, 8, 6)
     (tmp_path / "text.png").write_bytes(b"\x89PNG\r\n\x1a\n broken")
-    with pytest.raises(InputError, match="text.png: the mask is not a valid PNG"):
+    with pytest.raises(InputError, match=r"text.png: the mask is not a valid PNG"):
         load_masks(tmp_path, 8, 6)
     save(tmp_path / "text.png", np.zeros((6, 8), np.uint16))
     with pytest.raises(InputError, match="16 bits"):
@@ -111,9 +111,9 @@ def test_unusable_paths_are_refused_by_name(tmp_path):
 
 def test_wrong_sizes_are_refused_with_both_sizes(tmp_path):
     save(tmp_path / "cat.png", np.zeros((5, 9), np.uint8))
-    with pytest.raises(InputError, match="cat.png.*9x5.*8x6"):
+    with pytest.raises(InputError, match=r"cat.png.*9x5.*8x6"):
         load_masks(tmp_path, 8, 6)
-    with pytest.raises(InputError, match='"cat".*9x5.*8x6'):
+    with pytest.raises(InputError, match=r'"cat".*9x5.*8x6'):
         resolve([Region("cat", np.ones((5, 9), np.bool_))], 6, 8)
 
 

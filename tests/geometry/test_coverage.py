@@ -13,7 +13,7 @@ def circle(cx, cy, r, hole=False):
         [(r, 0), (r, K * r), (K * r, r), (0, r), (-K * r, r), (-r, K * r),
          (-r, 0), (-r, -K * r), (-K * r, -r), (0, -r), (K * r, -r), (r, -K * r)]
     )  # fmt: skip
-    points = np.rint((corner + (cx, cy)) * ONE).astype(np.int64)
+    points = np.rint((corner + np.array([cx, cy])) * ONE).astype(np.int64)
     return np.roll(points[::-1], 1, axis=0) if hole else points
 
 
@@ -73,11 +73,10 @@ def test_no_pixel_depends_on_its_tile(seed):
 def test_shared_edges_add_up():
     """Two shapes with a common border cover each pixel of it once."""
     border = np.array([(1000, 200), (1900, 900), (300, 1500), (1200, 2300)])
-    left = np.concatenate([border[:3], border[3:], [(900, 2310), (500, 2300), (100, 2300),
-                           (90, 1500), (80, 900), (100, 200), (300, 180), (600, 210)]])  # fmt: skip
-    back = border[::-1]
-    right = np.concatenate([back[:3], back[3:], [(1500, 190), (1900, 210), (2400, 200),
-                            (2410, 900), (2390, 1500), (2400, 2300), (2000, 2290), (1600, 2310)]])  # fmt: skip
+    left = [(900, 2310), (500, 2300), (100, 2300), (90, 1500), (80, 900), (100, 200)]
+    left = np.array([*border, *left, (300, 180), (600, 210)])
+    right = [(1500, 190), (1900, 210), (2400, 200), (2410, 900), (2390, 1500), (2400, 2300)]
+    right = np.array([*border[::-1], *right, (2000, 2290), (1600, 2310)])
     both = coverage([left], 0, 0, 10, 10) + coverage([right], 0, 0, 10, 10)
     assert (both[3:7, 1:9] == FULL).all()
 

@@ -1,0 +1,75 @@
+import numpy as np
+import pytest
+
+from proxyimg_codec.errors import FormatError
+from proxyimg_codec.texture.implicit import ImplicitTexture, pack, taps, unpack
+from tests.texture.test_network import NetShape, random_network
+
+NETWORK = random_network(NetShape(3, 1, 4, 1, 3), 8)
+
+
+def texture(bits=4, stored=None, rows=6, columns=9):
+    rng = np.random.default_rng(bits)
+    stored = np.ones((rows, columns), bool) if stored is None else stored
+    top = 1 << (bits - 1)
+    codes = np.where(stored, rng.integers(-top, top, (3, rows, columns)), 0).astype(np.int8)
+    steps = np.array([0.1, 0.25, 0.5], np.float16)
+    return ImplicitTexture(0, bits, steps, codes, stored)
+
+
+@pytest.mark.parametrize("bits", range(2, 9))
+@pytest.mark.parametrize("partial", [False, True])
+def test_textures_come_back(bits, partial):
+    stored = np.random.default_rng(0).random((6, 9)) < 0.5 if partial else None
+    a = texture(bits, stored)
+    b = unpack(pack(a), (NETWORK,))
+    assert (a.codes == b.codes).all()
+    assert (a.stored == b.stored).all()
+    assert (a.steps == b.steps).all()
+    assert (a.table == b.table).all()
+
+
+def test_corner_codes_sit_on_the_corners_of_the_box():
+    t = texture()
+    x, y = np.array([10.0, 26.0, 10.0, 26.0]), np.array([5.0, 5.0, 20.0, 20.0])
+    f = t.features(t.taps(x, y, (10, 5, 16, 15)))
+    corners = t.codes[:, [0, 0, -1, -1], [0, -1, 0, -1]].T * t.steps.astype(np.float32)
+    assert np.allclose(f, corners, atol=1e-6)
+
+
+def test_features_are_bilinear_and_clamped():
+    t = texture()
+    box = (0, 0, 80, 50)
+    x = np.array([15.0, -30.0, 200.0])
+    f = t.features(t.taps(x, np.full(3, 25.0), box))
+    values = t.codes * t.steps.astype(np.float32)[:, None, None]
+    middle = (values[:, 2] + values[:, 3]) / 2
+    assert np.allclose(f[0], (middle[:, 1] + middle[:, 2]) / 2, atol=1e-6)
+    assert np.allclose(f[1], middle[:, 0], atol=1e-6)
+    assert np.allclose(f[2], middle[:, -1], atol=1e-6)
+
+
+def test_taps_never_leave_the_plane():
+    x = np.linspace(-5, 25, 61)
+    t = taps(x, x, (0, 0, 20, 20), 2, 2)
+    assert (t.base == 0).all()
+    assert t.fx.min() == 0
+    assert t.fx.max() == 1
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"steps": b"\0\0" * 3}, {"steps": b"\0\x7c" * 3}, {"codes": b""}, {"grid": [9, 7]}],
+)
+def test_damage_is_found(change):
+    with pytest.raises(FormatError):
+        unpack({**pack(texture()), **change}, (NETWORK,))
+
+
+@pytest.mark.parametrize("value", [True, False])
+def test_a_full_or_empty_mask_is_not_canonical(value):
+    from proxyimg_codec.entropy import arrays
+
+    mask = arrays.encode(np.full((1, 6, 9), int(value)), 1, np.ones((6, 9), bool))
+    with pytest.raises(FormatError, match="full or empty"):
+        unpack({**pack(texture()), "stored": mask}, (NETWORK,))
