@@ -25,7 +25,7 @@ test: .venv/ready
 	$(BIN)/pytest
 
 bench: .venv/ready
-	$(BIN)/python -m benchmarks.figures
+	$(BIN)/python -m benchmarks.figures $(DATA)
 
 clean:
 	rm -rf .venv demo build *.egg-info proxyimg_codec/_kernel*.so

@@ -29,8 +29,8 @@ class Limits:
     side: int = 1 << 20
     layers: int = 1024
     networks: int = 64
-    segments: int = 1 << 20
-    codes: int = 1 << 27
+    segments: int = 1 << 16
+    codes: int = 1 << 25
     parameters: int = 1 << 22
     metadata_bytes: int = 1 << 26
     output_pixels: int = 1 << 28

@@ -128,7 +128,8 @@ def _check(c: Container, limits: Limits) -> None:
             raise FormatError("channels differ from HEAD", "chunk NETW")
         width = net["hidden"]
         encoded = net["dim"] * (2 * net["octaves"] + 1)
-        parameters += encoded * width + (net["depth"] - 1) * width**2 + width * net["channels"]
+        parameters += (encoded + 1) * width + (net["depth"] - 1) * (width + 1) * width
+        parameters += (width + 1) * net["channels"]
     limits.check("parameters", parameters)
     codes = 0
     for layer, texture in zip(c.layers, c.textures, strict=True):

@@ -14,6 +14,9 @@ FIELDS = (
     Field("zstd", "bin", "The block as one zstd frame."),
 )
 
+WINDOW_MAX = 1 << 27
+"""Largest window of a zstd frame in bytes."""
+
 INFO_TYPE = "iNFO"
 
 INFO_FIELDS = (
@@ -39,10 +42,24 @@ def decompress(payload: bytes, where: str, limits: Limits) -> bytes:
     values = unpack(FIELDS, payload, where)
     limits.check("metadata_bytes", values["size"])
     try:
-        reader = zstandard.ZstdDecompressor().stream_reader(values["zstd"])
+        decompressor = zstandard.ZstdDecompressor(max_window_size=WINDOW_MAX)
+        reader = decompressor.stream_reader(values["zstd"])
         block: bytes = reader.read(values["size"] + 1)
     except zstandard.ZstdError:
         raise FormatError("metadata is not a zstd frame", where) from None
     if len(block) != values["size"]:
         raise FormatError(f"metadata does not have the stated {values['size']} bytes", where)
+    if _frame_end(values["zstd"]) != len(values["zstd"]):
+        raise FormatError("bytes follow the zstd frame", where)
     return block
+
+
+def _frame_end(data: bytes) -> int:
+    """Length of the first zstd frame of valid `data` (RFC 8878, section 3.1.1)."""
+    at = int(zstandard.frame_header_size(data))
+    last = False
+    while not last:
+        header = int.from_bytes(data[at : at + 3], "little")
+        last, kind, size = bool(header & 1), header >> 1 & 3, header >> 3
+        at += 3 + (1 if kind == 1 else size)
+    return at + 4 * (data[4] >> 2 & 1)

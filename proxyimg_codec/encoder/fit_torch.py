@@ -60,6 +60,7 @@ class TorchTrainer:
         ends = np.cumsum([o for _, o in self._shape.layers])[:-1]
         rows = [self._tensor(s) for s in np.split(state.row_steps, ends)]
         batches = self._tensor(pixels).long()
+        self._clamp(steps, state.code_bits)
         total = 0.0
         for i, batch in enumerate(batches):
             for group, rate in zip(self._adam.param_groups, (lr_codes[i], lr_net[i]), strict=True):
@@ -75,14 +76,18 @@ class TorchTrainer:
             self._adam.zero_grad(set_to_none=True)
             (loss + self._smoothness(self._parameters[0])).backward()
             self._adam.step()
-            if steps is not None:
-                top = (1 << (state.code_bits - 1)) - 1
-                with torch.no_grad():  # kept near the range, so that a clamped code can come back
-                    self._parameters[0].clamp_(-(top + 1.5) * steps, (top + 0.5) * steps)
+            self._clamp(steps, state.code_bits)
             total += float(loss.detach())
         for array, p in zip((state.codes, *flat), self._parameters, strict=True):
             array[...] = p.detach().cpu().numpy()
         return total / len(batches)
+
+    def _clamp(self, steps: Any, bits: int) -> None:
+        """Keeps quantized codes near the range, so that a clamped code can come back."""
+        if steps is not None:
+            top = (1 << (bits - 1)) - 1
+            with self._torch.no_grad():
+                self._parameters[0].clamp_(-(top + 1.5) * steps, (top + 0.5) * steps)
 
     def _round(self, x: Any, step: Any, bits: int) -> Any:
         top = (1 << (bits - 1)) - 1

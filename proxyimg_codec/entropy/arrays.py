@@ -122,8 +122,9 @@ def decode(
     high = min(bits, MODEL_BITS)
     low = bits - high
     channels, height, width = shape
-    known = np.full((height + 1, width + 2, channels), -1, np.int16)
     decoder = Decoder(data)
+    decoder.check_capacity(int(np.count_nonzero(stored)) * channels, 1 << high)
+    known = np.full((height + 1, width + 2, channels), -1, np.int16)
     _decode_symbols(decoder, known, stored, 1 << high)
     decoder.finish()
     out = np.zeros(shape, np.uint8)

@@ -99,7 +99,21 @@ class Decoder:
             raise FormatError("entropy-coded stream is truncated")
         self.words = np.frombuffer(data, "<u2", count, head).astype(np.uint64)
         self.used = 0
+        if (self.states < LOW).any():
+            raise FormatError("entropy-coded stream starts from an invalid state")
         self.end = head + 2 * count
+
+    def check_capacity(self, symbols: int, alphabet: int) -> None:
+        """Refuses at once what cannot hold `symbols`: a small file cannot ask for a huge array.
+
+        The most probable symbol has a frequency of at most T - A + 1, with T = 2**SCALE_BITS, so
+        each takes at least (A - 1) / T bits; words and states hold 16 bits each above `LOW`.
+
+        Raises:
+            FormatError: There are too few words.
+        """
+        if symbols * (alphabet - 1) > 16 * (len(self.words) + self.lanes) << SCALE_BITS:
+            raise FormatError("entropy-coded stream is too short for its array")
 
     def symbols(self, cdf: NDArray[np.int64]) -> NDArray[np.int64]:
         """The next N symbols, whose cumulative frequencies are the rows of `cdf` [N, A + 1].

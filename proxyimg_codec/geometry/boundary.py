@@ -122,6 +122,8 @@ def _read_deltas(data: bytes, classes: NDArray[np.int64], where: str) -> NDArray
         first = ends[at] - n
         weights = np.int64(1) << np.arange(n - 1, -1, -1, dtype=np.int64)
         value = bits[first[:, None] + np.arange(n)] @ weights
+        if k == _ESCAPE and (value < 1 << (_ESCAPE - 1)).any():
+            raise FormatError("a delta is coded in a larger class than it needs", where)
         value += 0 if k == _ESCAPE else 1 << n
         out[at] = np.where(bits[first - 1] == 1, -value, value)
     return out

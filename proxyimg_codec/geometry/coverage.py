@@ -26,6 +26,9 @@ FLATNESS = 16
 
 MAX_LOG2_CHORDS = 8
 
+SCALED_MAX = 1 << 30
+"""Scaled coordinates are clamped to -SCALED_MAX .. SCALED_MAX, so that 64 bits are enough."""
+
 
 def to_output(points: Ints, unit: int, origin: int, size: int, pixels: int) -> Ints:
     """One axis of control points in units of 2**-unit px -> 1/256 output pixel, rounded half up.
@@ -40,7 +43,8 @@ def to_output(points: Ints, unit: int, origin: int, size: int, pixels: int) -> I
     ratio = Fraction(pixels * ONE, size << unit)
     numerator, denominator = ratio.numerator, ratio.denominator
     shifted = points - (origin << unit)
-    return (2 * shifted * numerator + denominator) // (2 * denominator)
+    scaled = (2 * shifted * numerator + denominator) // (2 * denominator)
+    return np.clip(scaled, -SCALED_MAX, SCALED_MAX)
 
 
 def flatten(path: Ints) -> tuple[Ints, Ints]:

@@ -100,9 +100,11 @@ def _tile(
 def premultiplied(output: Floats) -> Floats:
     """Network outputs [N, 3 or 4] clamped to valid premultiplied colour and alpha [N, 4].
 
-    Colour outputs are in 0..1; with a fourth output alpha is in 0..1 and colour in 0..alpha.
+    Outputs that are not numbers count as 0. Colour is in 0..1; with a fourth output alpha is in
+    0..1 and colour in 0..alpha.
     """
     result = np.ones((len(output), 4), np.float32)
+    np.nan_to_num(output, copy=False)
     if output.shape[1] == 4:
         np.clip(output[:, 3], 0, 1, out=result[:, 3])
     np.clip(output[:, :3], 0, result[:, 3:], out=result[:, :3])

@@ -10,8 +10,11 @@ from numpy.typing import NDArray
 
 from ..errors import LimitError, UsageError
 
-SIDE_MAX = 1 << 24
+SIDE_MAX = 1 << 21
 """Most output columns or rows; keeps fixed-point coordinates within 64 bits."""
+
+SUPERSAMPLING_MAX = 64
+"""Most samples along an axis of an output pixel: bounds what a thumbnail costs."""
 
 
 @dataclass(frozen=True)
@@ -36,8 +39,10 @@ class View:
 
     @property
     def supersampling(self) -> tuple[int, int]:
-        """Samples across and down an output pixel: ceil of the canvas pixels it spans."""
-        return -(-self.region_width // self.width), -(-self.region_height // self.height)
+        """Samples across and down an output pixel: the canvas pixels it spans, at most 64."""
+        across = -(-self.region_width // self.width)
+        down = -(-self.region_height // self.height)
+        return min(across, SUPERSAMPLING_MAX), min(down, SUPERSAMPLING_MAX)
 
     def columns(self, start: int, stop: int) -> NDArray[np.float64]:
         """Canvas x of sample columns start..stop-1; samples sit at the centres of their cells."""

@@ -100,3 +100,19 @@ def test_raw_bits_come_back(values, width):
     packed = arrays.pack_bits(values, width)
     assert len(packed) == (len(values) * width + 7) // 8
     assert (arrays.unpack_bits(packed, values.shape, width) == values).all()
+
+
+def test_the_cheapest_symbols_still_fit_the_bound():
+    """The early refusal of short streams never hits a real one."""
+    for bits in (1, 2, 4):
+        values = np.zeros((1, 400, 500), np.int64)
+        stored = np.ones((400, 500), bool)
+        data = arrays.encode(values, bits, stored)
+        assert (arrays.decode(data, values.shape, bits, stored) == 0).all()
+
+
+def test_a_small_stream_cannot_ask_for_a_huge_array():
+    data = arrays.encode(np.zeros((1, 5, 5), np.int64), 4, np.ones((5, 5), bool))
+    huge = np.broadcast_to(np.True_, (1 << 20, 1 << 10))
+    with pytest.raises(FormatError, match="too short"):
+        arrays.decode(data, (1, *huge.shape), 4, huge)

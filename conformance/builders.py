@@ -1,0 +1,192 @@
+"""Parts of hand-made pictures: reproducible numbers, networks, textures, paths; and their list."""
+
+from __future__ import annotations
+
+import math
+import zlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxyimg_codec.container.chunks import Chunk
+from proxyimg_codec.geometry.boundary import Boundary
+from proxyimg_codec.image import Image, Layer, Layers
+from proxyimg_codec.texture.implicit import Box, ImplicitTexture
+from proxyimg_codec.texture.network import NetShape, Network
+
+Path = NDArray[np.int64]
+Point = tuple[float, float]
+
+_ARC = 0.5523
+"""Distance of a Bézier circle's inner control points from its corners' ends, in radii."""
+
+
+class Numbers:
+    """Integers from a generator whose stream numpy guarantees for all versions."""
+
+    def __init__(self, name: str) -> None:
+        self.seed = zlib.crc32(name.encode())
+        self._bits = np.random.PCG64(self.seed)
+
+    def integers(self, low: int, high: int, shape: Sequence[int]) -> NDArray[np.int64]:
+        """Integers of low..high."""
+        raw = np.asarray(self._bits.random_raw(math.prod(shape)), np.uint64)
+        return (raw % np.uint64(high - low + 1)).astype(np.int64).reshape(shape) + low
+
+
+def network(
+    numbers: Numbers,
+    *,
+    dim: int = 3,
+    octaves: int = 1,
+    hidden: int = 6,
+    depth: int = 1,
+    channels: int = 3,
+    bits: int = 8,
+    contrast: float = 0.6,
+) -> Network:
+    """A network with random weights, scaled so that at contrast 0.6 most outputs lie in 0..1."""
+    shape = NetShape(dim, octaves, hidden, depth, channels)
+    top = 1 << (bits - 1)
+    weights = tuple(
+        numbers.integers(-top, top - 1, (o, i)).astype(np.int8) for i, o in shape.layers
+    )
+    gain = [1.5] * depth + [contrast]
+    steps = [
+        np.full(o, g / (top * math.sqrt(i))) for (i, o), g in zip(shape.layers, gain, strict=True)
+    ]
+    biases = numbers.integers(-32, 32, (shape.rows,)) / 128
+    biases[-channels:] += 0.5
+    return Network(
+        shape, bits, weights,
+        np.concatenate(steps).astype(np.float16), biases.astype(np.float16),
+    )  # fmt: skip
+
+
+def texture(
+    numbers: Numbers,
+    *,
+    dim: int = 3,
+    grid: tuple[int, int] = (5, 4),
+    bits: int = 4,
+    network: int = 0,
+    stored: NDArray[np.bool_] | None = None,
+    reach: float = 0.6,
+) -> ImplicitTexture:
+    """Random codes whose features lie in about -reach..reach.
+
+    Args:
+        numbers: Where they come from.
+        dim: Features, as the network has.
+        grid: Columns and rows.
+        bits: Bits a code.
+        network: Its index.
+        stored: bool [rows, columns], which codes are stored; all by default.
+        reach: Largest magnitude of a feature; step d is that of step 0 times 1 + d / 8.
+    """
+    columns, rows = grid
+    top = 1 << (bits - 1)
+    codes = numbers.integers(-top, top - 1, (dim, rows, columns)).astype(np.int8)
+    known = np.ones((rows, columns), bool) if stored is None else stored
+    steps = (reach / top * (1 + np.arange(dim) / 8)).astype(np.float16)
+    return ImplicitTexture(network, bits, steps, np.where(known, codes, np.int8(0)), known)
+
+
+def ellipse(centre: Point, radii: Point, *, unit: int = 4, reverse: bool = False) -> Path:
+    """Control points int64 [12, 2] of an ellipse in four segments."""
+    turns = [(1, 0), (0, 1), (-1, 0), (0, -1)]
+    points: list[Point] = []
+    for (ax, ay), (bx, by) in zip(turns, turns[1:] + turns[:1], strict=True):
+        points += [(ax, ay), (ax + _ARC * bx, ay + _ARC * by), (bx + _ARC * ax, by + _ARC * ay)]
+    return _snapped(
+        [(centre[0] + x * radii[0], centre[1] + y * radii[1]) for x, y in points], unit, reverse
+    )
+
+
+def polygon(*corners: Point, unit: int = 4, reverse: bool = False) -> Path:
+    """Control points int64 [3 m, 2] of a polygon with m corners and straight sides."""
+    points: list[Point] = []
+    for (ax, ay), (bx, by) in zip(corners, [*corners[1:], corners[0]], strict=True):
+        points += [(ax + (bx - ax) * k / 3, ay + (by - ay) * k / 3) for k in range(3)]
+    return _snapped(points, unit, reverse)
+
+
+def _snapped(points: Sequence[Point], unit: int, reverse: bool) -> Path:
+    path = np.floor(np.array(points) * (1 << unit) + 0.5).astype(np.int64)
+    return np.roll(path[::-1], 1, axis=0) if reverse else path
+
+
+def layer(name: str, box: Box, texture: ImplicitTexture, *paths: Path, unit: int = 4) -> Layer:
+    """A layer; without paths it covers the whole canvas."""
+    return Layer(name, box, Boundary(unit, paths) if paths else None, texture)
+
+
+def picture(
+    size: tuple[int, int],
+    layers: Sequence[Layer],
+    *networks: Network,
+    opaque: bool = True,
+    extra: Sequence[Chunk] = (),
+) -> Image:
+    """An image of `layers`, back to front."""
+    return Image(
+        *size, networks[0].shape.channels, opaque, 8, Layers(layers), networks, extra=tuple(extra)
+    )
+
+
+def layered(n: Numbers, channels: int = 3) -> Image:
+    """Three layers: a back, an ellipse and a triangle that overlap."""
+    w, h = 32, 24
+    return picture(
+        (w, h),
+        [
+            layer("back", (0, 0, w, h), texture(n)),
+            layer("disc", (4, 3, 18, 16), texture(n), ellipse((13, 11), (8.5, 7.25))),
+            layer(
+                "triangle", (10, 6, 20, 17), texture(n), polygon((28.5, 7), (25, 22.25), (11, 14))
+            ),
+        ],
+        network(n, channels=channels, contrast=0.6 if channels == 3 else 1.5),
+        opaque=channels == 3,
+    )
+
+
+Args = Mapping[str, Any]
+Build = Callable[[Numbers], Image | bytes]
+WHOLE: Args = {}
+"""Arguments of the plainest render."""
+
+
+@dataclass(frozen=True)
+class Valid:
+    """A valid case.
+
+    Attributes:
+        title: One sentence.
+        tests: What it is there for.
+        build: Makes the picture, or its file where the package would not write it so.
+        renders: Arguments of each render.
+    """
+
+    title: str
+    tests: tuple[str, ...]
+    build: Build
+    renders: Sequence[Args]
+
+
+class Valids(dict[str, Valid]):
+    """Valid cases by name."""
+
+    def case(
+        self, title: str, *tests: str, renders: Sequence[Args] = (WHOLE,)
+    ) -> Callable[[Build], None]:
+        """Decorates a builder, whose name, with dashes, becomes that of the case."""
+
+        def register(build: Build) -> None:
+            name = getattr(build, "__name__", "").strip("_").replace("_", "-")
+            self[name] = Valid(title, tests, build, renders)
+
+        return register

@@ -1,0 +1,127 @@
+"""Whether a decoder did with a case what it must."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import pixels
+from .cases import EXIT_CODES, Case, Render
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a run of a decoder ended: its exit code, None if it was stopped, and what it said."""
+
+    code: int | None
+    message: str = ""
+
+
+Decoder = Callable[[Path, Path, Sequence[str]], Ended]
+"""Called with the input, where the picture goes, and flags."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """The verdict on one run.
+
+    Attributes:
+        case: Name of the case.
+        render: Which of its renders, from 0.
+        problem: Empty if it passed, else ``timeout``, ``exit``, ``output``, ``size`` or ``pixels``,
+            a colon and the details.
+        peak: Largest error in 8-bit levels, or None if nothing was compared.
+        rms: Root mean square error, likewise.
+        seconds: How long the decoder ran.
+    """
+
+    case: str
+    render: int
+    problem: str
+    peak: float | None
+    rms: float | None
+    seconds: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether nothing was wrong."""
+        return not self.problem
+
+
+def judge(case: Case, number: int, decoder: Decoder, suffix: str = ".png") -> Result:
+    """Runs `decoder` on render `number` of a case, or on an input that must be refused.
+
+    Args:
+        case: The case.
+        number: Position in `case.renders`; 0 if the case has none.
+        decoder: What is tested.
+        suffix: Of the output: ``.png`` or ``.npy``.
+    """
+    render = case.renders[number] if case.renders else None
+    with tempfile.TemporaryDirectory(prefix="pxi-conformance-") as folder:
+        output = Path(folder) / f"out{suffix}"
+        started = time.perf_counter()
+        ended = decoder(case.input, output, render.flags if render else ())
+        seconds = time.perf_counter() - started
+        peak = rms = None
+        problem = _ending(ended, EXIT_CODES[case.error] if case.error else 0)
+        if not problem and render is None and output.exists():
+            problem = "output: a picture was written although the file must be refused"
+        if not problem and render is not None:
+            problem, peak, rms = _compare(output, render)
+    return Result(case.name, number, problem, peak, rms, seconds)
+
+
+def _ending(ended: Ended, wanted: int) -> str:
+    said = (ended.message.strip().splitlines() or ["no message"])[-1][:200]
+    if ended.code is None:
+        return f"timeout: {said}"
+    if ended.code < 0:
+        return f"exit: killed by signal {-ended.code} instead of code {wanted} ({said})"
+    if ended.code != wanted:
+        return f"exit: code {ended.code} instead of {wanted} ({said})"
+    return ""
+
+
+def _compare(output: Path, render: Render) -> tuple[str, float | None, float | None]:
+    """Problem, peak and RMS of a decoder's picture."""
+    expected = pixels.read(render.expected.read_bytes())
+    try:
+        got = pixels.read(output.read_bytes())
+    except OSError:
+        return "output: no picture was written", None, None
+    except ValueError as error:
+        return f"output: {error}", None, None
+    if got.shape[:2] != expected.shape[:2]:
+        size, wanted = (f"{s[1]}x{s[0]}" for s in (got.shape, expected.shape))
+        return f"size: {size} instead of {wanted}", None, None
+    if not np.isfinite(got).all():
+        return "pixels: not all are finite numbers", None, None
+    peak, rms = difference(got, expected)
+    # Written so that a NaN could not pass.
+    if not (peak <= render.peak and rms <= render.rms):
+        allowed = f"{render.peak:g} and {render.rms:g}"
+        return f"pixels: peak {peak:.3f} and RMS {rms:.3f} exceed {allowed}", peak, rms
+    return "", peak, rms
+
+
+def difference(a: NDArray[Any], b: NDArray[Any]) -> tuple[float, float]:
+    """Peak and RMS difference of two pictures [H, W, 3 or 4] in 8-bit levels."""
+    error = np.abs(_levels(a) - _levels(b))
+    return float(error.max()), float(np.sqrt(np.mean(error**2)))
+
+
+def _levels(picture: NDArray[Any]) -> NDArray[np.float64]:
+    """Premultiplied [H, W, 4] in 8-bit levels; without alpha a picture is opaque."""
+    top = 1.0 if picture.dtype.kind == "f" else float(np.iinfo(picture.dtype).max)
+    values = np.ones((*picture.shape[:2], 4))
+    values[..., : picture.shape[2]] = picture / top
+    values[..., :3] *= values[..., 3:]
+    return values * 255

@@ -1,0 +1,130 @@
+"""Makes all cases anew: ``python -m conformance.make_cases``; with --check only compares.
+
+Inputs and descriptions are the same on every machine. Expected pixels come from the package's
+plain numpy decoder, whose last bits may differ from machine to machine, and are not compared.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from proxyimg_codec import errors, kernel
+from proxyimg_codec.image import from_bytes
+from proxyimg_codec.pictures import encode_png
+
+from . import invalid, valid, views
+from .builders import Numbers
+from .cases import EXIT_CODES, FOLDER
+
+PEAK, RMS = 0.05, 0.01
+"""Errors in 8-bit levels that are allowed: ten times what float32 sums in another order cost."""
+
+
+def build() -> dict[str, tuple[bytes, dict[str, Any]]]:
+    """Input and description of every case, by name."""
+    out: dict[str, tuple[bytes, dict[str, Any]]] = {}
+    for name, case in {**valid.CASES, **views.CASES}.items():
+        numbers = Numbers(name)
+        made = case.build(numbers)
+        renders = [
+            {"args": args, "expected": f"expected-{i}.png", "peak": PEAK, "rms": RMS}
+            for i, args in enumerate(case.renders, 1)
+        ]
+        description = {
+            "title": case.title,
+            "tests": list(case.tests),
+            "provenance": {"generator": "conformance.make_cases", "seed": numbers.seed},
+            "renders": renders,
+        }
+        out[name] = made if isinstance(made, bytes) else made.to_bytes(), description
+    base = invalid.Base()
+    for name, bad in invalid.CASES.items():
+        error = name.split("-")[0]
+        out[name] = (
+            bad.build(base),
+            {
+                "title": bad.title,
+                "tests": list(bad.tests),
+                "provenance": {"generator": "conformance.make_cases", "seed": Numbers("base").seed},
+                "error": error,
+                "exit_code": EXIT_CODES[error],
+            },
+        )
+    return out
+
+
+def as_text(description: dict[str, Any]) -> str:
+    """The text of `case.json`."""
+    return json.dumps(description, indent=1) + "\n"
+
+
+def differences(folder: Path = FOLDER) -> list[str]:
+    """Cases whose input or description on disk is not what the generator makes."""
+    made = build()
+    there = {f.name for f in folder.iterdir()} if folder.is_dir() else set()
+    wrong = sorted(there ^ made.keys())
+    for name in sorted(there & made.keys()):
+        data, description = made[name]
+        same = (folder / name / "input.pxi").read_bytes() == data
+        text = (folder / name / "case.json").read_text(encoding="utf-8")
+        if not (same and text == as_text(description)):
+            wrong.append(name)
+    return wrong
+
+
+def write(folder: Path = FOLDER) -> None:
+    """Replaces all cases.
+
+    Raises:
+        RuntimeError: The package itself does not do with an input what the case demands.
+    """
+    os.environ["PROXYIMG_NO_KERNEL"] = "1"
+    kernel.library.cache_clear()
+    made = build()
+    shutil.rmtree(folder, ignore_errors=True)
+    for name, (data, description) in made.items():
+        target = folder / name
+        target.mkdir(parents=True)
+        (target / "input.pxi").write_bytes(data)
+        (target / "case.json").write_text(as_text(description), encoding="utf-8")
+        if "error" in description:
+            _check_refusal(name, data, description["exit_code"])
+        for render in description.get("renders", []):
+            pixels = from_bytes(data).render(**render["args"], dtype=np.uint16, engine="numpy")
+            (target / render["expected"]).write_bytes(encode_png(pixels))
+
+
+def _check_refusal(name: str, data: bytes, code: int) -> None:
+    try:
+        from_bytes(data).render()
+    except errors.PxiError as error:
+        if error.exit_code == code:
+            return
+        raise RuntimeError(f"{name}: {error}") from error
+    raise RuntimeError(f"{name}: the package accepts it")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point; returns the exit code."""
+    parser = argparse.ArgumentParser("conformance.make_cases", description="Make all cases anew.")
+    parser.add_argument("--check", action="store_true", help="write nothing, compare with the disk")
+    if not parser.parse_args(argv).check:
+        write()
+        return 0
+    wrong = differences()
+    for name in wrong:
+        print(f"{name}: differs from what the generator makes", file=sys.stderr)
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

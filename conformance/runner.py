@@ -1,0 +1,105 @@
+"""Tests any decoder that is a command: ``python -m conformance.runner --decoder "CMD"``."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shlex
+import shutil
+import sys
+import time
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict
+from pathlib import Path
+
+from .cases import FOLDER, Case, load
+from .judge import Decoder, Result, judge
+from .processes import command_decoder, expand
+
+OWN_DECODER = f"{shlex.quote(sys.executable)} -m proxyimg_codec.cli.decode {{in}} {{out}} {{args}}"
+
+
+def run(
+    cases: Sequence[Case], decoder: Decoder, jobs: int = 1, suffix: str = ".png"
+) -> list[Result]:
+    """The verdicts on every render of every case, in order."""
+    runs = [(case, i) for case in cases for i in range(max(len(case.renders), 1))]
+    if jobs == 1:
+        return [judge(case, i, decoder, suffix) for case, i in runs]
+    with ThreadPoolExecutor(jobs) as pool:
+        return list(pool.map(lambda r: judge(r[0], r[1], decoder, suffix), runs))
+
+
+def table(results: Sequence[Result]) -> str:
+    """One line a run: case, result, peak, RMS, seconds, and what went wrong."""
+    width = max(len(r.case) for r in results) + 3
+    lines = [f"{'case':{width}} result    peak     rms  seconds"]
+    for r in results:
+        name = f"{r.case} {r.render + 1}" if r.render else r.case
+        errors = [f"{'-' if v is None else f'{v:.3f}':>7}" for v in (r.peak, r.rms)]
+        verdict = "ok" if r.passed else "FAILED"
+        line = f"{name:{width}} {verdict:6} {' '.join(errors)} {r.seconds:8.2f}  {r.problem}"
+        lines.append(line.rstrip())
+    return "\n".join(lines)
+
+
+def failed_cases(results: Sequence[Result]) -> list[str]:
+    """Names of the cases of which at least one run failed."""
+    return list(dict.fromkeys(r.case for r in results if not r.passed))
+
+
+def arguments() -> argparse.ArgumentParser:
+    """The command line."""
+    p = argparse.ArgumentParser("conformance.runner", description="Test a decoder of .pxi files.")
+    add = p.add_argument
+    add("--decoder", metavar="CMD", default=OWN_DECODER,
+        help="command with {in}, {out} and {args}; pxi-decode by default")  # fmt: skip
+    add("--cases", metavar="DIR", type=Path, default=FOLDER, help="folder of cases")
+    add("--only", metavar="PATTERN", default="*", help="names of cases, with * and ?")
+    add("--format", choices=["png", "npy"], default="png", help="type of output to ask for")
+    add("-j", "--jobs", type=int, default=os.cpu_count() or 1, help="runs at a time")
+    add("--timeout", type=float, default=30, metavar="S", help="seconds a run; 30 by default")
+    add("--memory", type=int, default=1024, metavar="MB", help="megabytes a run; 1024 by default")
+    add("--json", type=Path, metavar="FILE", help="write the results there too")
+    return p
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point: 0 if all passed, 1 if anything failed."""
+    parser = arguments()
+    args = parser.parse_args(argv)
+    if args.jobs < 1 or args.timeout <= 0 or args.memory < 1:
+        parser.error("--jobs, --timeout and --memory must be positive")
+    cases = load(args.cases, args.only)
+    if not cases:
+        parser.error(f"no case in {args.cases} matches {args.only}")
+    try:
+        program = expand(args.decoder, Path("in"), Path("out"), [])[0]
+    except ValueError as error:
+        parser.error(str(error))
+    if shutil.which(program) is None:
+        parser.error(f"{program} is not a program")
+    started = time.perf_counter()
+    decoder = command_decoder(args.decoder, args.timeout, args.memory << 20)
+    results = run(cases, decoder, args.jobs, f".{args.format}")
+    seconds = time.perf_counter() - started
+    failed = failed_cases(results)
+    print(table(results))
+    print(f"{len(cases) - len(failed)} of {len(cases)} cases passed, "
+          f"{len(results)} runs, {seconds:.1f} s")  # fmt: skip
+    if args.json:
+        report = {
+            "decoder": args.decoder,
+            "cases": len(cases),
+            "failed": failed,
+            "seconds": seconds,
+            "results": [asdict(r) | {"passed": r.passed} for r in results],
+        }
+        args.json.write_text(json.dumps(report, indent=1, allow_nan=False) + "\n")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,197 @@
+"""Prints a `.pxi` file byte by byte with the meaning of every field: `python -m spec.dump FILE`."""
+
+from __future__ import annotations
+
+import argparse
+import struct
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import msgpack
+import numpy as np
+
+from proxyimg_codec.container import chunks, meta
+from proxyimg_codec.errors import PxiError
+from proxyimg_codec.files import read_bytes
+from proxyimg_codec.geometry import coverage as cover
+from proxyimg_codec.image import Image, from_bytes
+from proxyimg_codec.texture.diffusion import fill
+
+Piece = tuple[int, str]
+"""A number of bytes and what they mean."""
+
+LINE = 16
+"""Bytes a line."""
+
+LINES = 16
+"""Lines of one piece that are shown; the rest is counted."""
+
+MAPS = ("HEAD", "LAYR", "NETW", "TEXR", meta.INFO_TYPE, *meta.BLOCKS.values())
+
+
+def coded_array(data: bytes) -> Iterator[Piece]:
+    """Pieces of a coded array."""
+    lanes = 1 << data[0]
+    words = int.from_bytes(data[1 + 4 * lanes : 5 + 4 * lanes], "little")
+    yield 1, f"rANS stream with 2^{data[0]} lanes"
+    yield 4 * lanes, "initial states"
+    yield 4, f"{words} words"
+    if words:
+        yield 2 * words, "words"
+    raw = len(data) - 5 - 4 * lanes - 2 * words
+    if raw:
+        yield raw, "raw bits"
+
+
+def halves(data: bytes) -> Iterator[Piece]:
+    """Pieces of an array of float16."""
+    for at in range(0, len(data), LINE):
+        part = data[at : at + LINE]
+        yield len(part), " ".join(f"{v:g}" for v in struct.unpack(f"<{len(part) // 2}e", part))
+
+
+def arrays(data: bytes) -> Iterator[Piece]:
+    """Pieces of coded arrays that each stand after their length."""
+    at = 0
+    while at < len(data):
+        size = int.from_bytes(data[at : at + 4], "little")
+        yield 4, f"coded array of {size} bytes"
+        yield from coded_array(data[at + 4 : at + 4 + size])
+        at += 4 + size
+
+
+def blob(meaning: str) -> Callable[[bytes], Iterator[Piece]]:
+    """A function that makes one piece of all bytes."""
+    return lambda data: iter([(len(data), meaning)])
+
+
+BINARY: dict[str, Callable[[bytes], Iterator[Piece]]] = {
+    "classes": coded_array,
+    "deltas": blob("raw bits"),
+    "steps": halves,
+    "biases": halves,
+    "weights": arrays,
+    "stored": coded_array,
+    "codes": coded_array,
+    "zstd": blob("Zstandard frame"),
+}
+"""What is inside the binary fields."""
+
+
+def map_pieces(payload: bytes) -> Iterator[Piece]:
+    """Pieces of a MessagePack map of bytes, strings, integers and arrays of integers."""
+    unpacker = msgpack.Unpacker()
+    unpacker.feed(payload)
+    count = unpacker.read_map_header()
+    at = unpacker.tell()
+    yield at, f"map of {count} entries"
+    for _ in range(count):
+        key, start = unpacker.unpack(), at
+        at = unpacker.tell()
+        yield at - start, f"key {key!r}"
+        value, start = unpacker.unpack(), at
+        at = unpacker.tell()
+        if isinstance(value, bytes):
+            yield at - start - len(value), f"{len(value)} bytes"
+            if value:
+                yield from BINARY[key](value)
+        else:
+            yield at - start, f"  {value!r}"
+
+
+def pieces(data: bytes) -> Iterator[Piece]:
+    """Pieces of a whole file.
+
+    Raises:
+        PxiError: The framing is damaged.
+    """
+    yield 8, "signature"
+    yield 1, f"major version {data[8]}"
+    yield 1, f"minor version {data[9]}"
+    yield 2, "reserved"
+    for chunk in chunks.read(data):
+        yield 0, ""
+        yield 4, f"chunk {chunk.type}"
+        yield 4, f"payload of {len(chunk.payload)} bytes"
+        if chunk.type in MAPS:
+            yield from map_pieces(chunk.payload)
+        elif chunk.payload:
+            yield len(chunk.payload), "payload"
+        yield 4, "CRC-32"
+
+
+def dump(data: bytes) -> Iterator[str]:
+    """Lines of offset, bytes and meaning."""
+    at = 0
+    for size, meaning in pieces(data):
+        if not size:
+            yield ""
+        for i in range(at, min(at + size, at + LINE * LINES), LINE):
+            row = data[i : min(i + LINE, at + size)].hex(" ")
+            yield f"{i:06x}  {row:{3 * LINE}} {meaning if i == at else ''}".rstrip()
+        if size > LINE * LINES:
+            yield f"        ... {size - LINE * LINES} more bytes"
+        at += size
+
+
+def grid(values: np.ndarray, shown: np.ndarray | None = None) -> Iterator[str]:
+    """Lines of a matrix of integers; a dot where `shown` is false."""
+    cells = [
+        [str(v) if shown is None or shown[y, x] else "." for x, v in enumerate(row)]
+        for y, row in enumerate(values)
+    ]
+    width = max(len(cell) for row in cells for cell in row)
+    for row in cells:
+        yield "  " + " ".join(cell.rjust(width) for cell in row)
+
+
+def values(image: Image) -> Iterator[str]:
+    """Lines of the integers that a small file decodes to."""
+    for i, network in enumerate(image.networks):
+        for k, weights in enumerate(network.weights):
+            yield f"network {i}, weights of linear layer {k}"
+            yield from grid(weights)
+    for layer in image.layers:
+        if layer.boundary is not None:
+            for k, path in enumerate(layer.boundary.paths):
+                yield f"layer {layer.name!r}, control points of path {k}"
+                yield "  " + " ".join(f"({x}, {y})" for x, y in path)
+            scaled = [
+                np.stack(
+                    [cover.to_output(p[:, i], layer.boundary.unit, 0, n, n)
+                     for i, n in enumerate((image.width, image.height))], axis=1
+                )
+                for p in layer.boundary.paths
+            ]  # fmt: skip
+            yield f"layer {layer.name!r}, coverage of the canvas in 1/{cover.FULL}"
+            yield from grid(cover.coverage(scaled, 0, 0, image.width, image.height))
+        texture = layer.texture
+        filled = fill(texture.codes, texture.stored)
+        for f, codes in enumerate(texture.codes):
+            yield f"layer {layer.name!r}, codes of feature {f}"
+            yield from grid(codes, texture.stored)
+            if not texture.stored.all():
+                yield f"layer {layer.name!r}, filled codes of feature {f}"
+                yield from grid(filled[f])
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Entry point; returns the exit code."""
+    parser = argparse.ArgumentParser(prog="spec.dump", description=__doc__)
+    parser.add_argument("file", type=Path)
+    parser.add_argument("--values", action="store_true", help="print the decoded integers instead")
+    args = parser.parse_args(argv)
+    try:
+        data = read_bytes(args.file)
+        lines = values(from_bytes(data)) if args.values else dump(data)
+        for line in lines:
+            print(line)
+    except PxiError as error:
+        print(f"spec.dump: {error}", file=sys.stderr)
+        return error.exit_code
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

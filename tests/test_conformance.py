@@ -1,0 +1,327 @@
+import contextlib
+import functools
+import io
+import json
+import shlex
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from conformance import judge, make_cases, pixels, runner, wrong_decoders
+from conformance.cases import FOLDER, Case, Render, flags, load
+from conformance.judge import Ended
+from conformance.processes import command_decoder, expand
+from proxyimg_codec import kernel, pictures
+from proxyimg_codec.cli import decode
+
+CASES = load()
+BY_NAME = {case.name: case for case in CASES}
+
+
+def in_process(source, target, flags, fault=None):
+    """The package's decoder, or a wrong one, without a process of its own."""
+    with contextlib.ExitStack() as stack:
+        said = stack.enter_context(contextlib.redirect_stderr(io.StringIO()))
+        if fault:
+            stack.enter_context(wrong_decoders.fault(fault))
+            flags = [*flags, "--engine", "numpy"]
+        code = decode.main([str(source), str(target), "--quiet", *flags])
+    return Ended(code, said.getvalue())
+
+
+@pytest.fixture
+def no_kernel(monkeypatch):
+    monkeypatch.setenv("PROXYIMG_NO_KERNEL", "1")
+    kernel.library.cache_clear()
+    yield
+    monkeypatch.undo()
+    kernel.library.cache_clear()
+
+
+@pytest.fixture
+def at_root(monkeypatch):
+    monkeypatch.chdir(FOLDER.parents[1])
+
+
+def problems(results):
+    return [f"{r.case} {r.render}: {r.problem}" for r in results if not r.passed]
+
+
+# The suite itself.
+
+
+def test_the_generator_reproduces_the_cases():
+    assert make_cases.differences() == []
+
+
+def test_differences_are_noticed(tmp_path, capsys, monkeypatch):
+    made = {n: make_cases.build()[n] for n in ("pixel", "invalid-empty", "limit-grid")}
+    monkeypatch.setattr(make_cases, "build", lambda: made)
+    make_cases.write(tmp_path)
+    assert make_cases.differences(tmp_path) == []
+    (tmp_path / "pixel" / "input.pxi").write_bytes(b"other")
+    (tmp_path / "limit-grid" / "case.json").write_text("{}")
+    (tmp_path / "invalid-empty").rename(tmp_path / "more")
+    assert make_cases.differences(tmp_path) == ["invalid-empty", "more", "limit-grid", "pixel"]
+
+
+def test_the_suite_is_sound():
+    assert sum(not c.error for c in CASES) >= 30
+    assert sum(bool(c.error) for c in CASES) >= 60
+    for case in CASES:
+        assert case.title
+        assert case.tests
+        assert (case.name.split("-")[0] if case.error else None) == case.error
+        expected = {r.expected.name for r in case.renders}
+        assert {f.name for f in case.input.parent.iterdir()} == {
+            "input.pxi",
+            "case.json",
+            *expected,
+        }
+        # RMS can never exceed peak: a larger limit would test nothing.
+        assert all(0 < r.rms < r.peak < 0.5 for r in case.renders)
+    assert sum(f.stat().st_size for f in FOLDER.rglob("*.*")) < 500_000
+
+
+def test_cases_differ_from_a_flat_picture():
+    for case in CASES:
+        for render in case.renders:
+            if render.expected.stat().st_size > 200:
+                assert np.ptp(pixels.read(render.expected.read_bytes())) > 10_000, case.name
+
+
+# Decoders.
+
+
+def test_the_package_passes():
+    assert problems(runner.run(CASES, in_process)) == []
+
+
+def test_the_package_passes_without_its_kernel(no_kernel):
+    assert not kernel.available()
+    assert problems(runner.run(CASES, in_process)) == []
+
+
+def test_the_package_passes_as_a_command(tmp_path, capsys, at_root):
+    report = tmp_path / "report.json"
+    for pattern, kind in (("alpha", "png"), ("invalid-crc-t*", "npy"), ("pixel", "npy")):
+        options = ["--only", pattern, "--format", kind, "-j", "2", "--json", str(report)]
+        assert runner.main(options) == 0
+        assert "cases passed" in capsys.readouterr().out
+    report = json.loads(report.read_text())
+    assert (report["cases"], report["failed"], len(report["results"])) == (1, [], 2)
+    assert report["results"][0]["passed"]
+    assert report["results"][0]["peak"] < 0.05
+
+
+CAUGHT = {
+    # fault: (case that catches it, kind of problem, case that it passes or "")
+    "half-pixel": ("one-layer", "pixels", "invalid-crc-head"),
+    "layer-order": ("layers", "pixels", "one-layer"),
+    "ignores-holes": ("hole", "pixels", "layers"),
+    "even-odd": ("winding", "pixels", "hole"),
+    "hard-edges": ("layers", "pixels", "one-layer"),
+    "coarse-coverage": ("layers", "pixels", "one-layer"),
+    "points-floored": ("enlarged", "pixels", "layers"),
+    "coarse-curves": ("layers", "pixels", "one-layer"),
+    "escape-narrow": ("escape", "exit", "layers"),
+    "swaps-channels": ("one-layer", "pixels", "invalid-names"),
+    "not-premultiplied": ("alpha", "pixels", "layers"),
+    "drops-alpha": ("no-back", "pixels", "one-layer"),
+    "zeros-for-diffusion": ("diffusion", "pixels", "layers"),
+    "no-smoothing": ("diffusion", "pixels", "layers"),
+    "nearest": ("one-layer", "pixels", "invalid-order"),
+    "no-octaves": ("octaves-7", "pixels", "octaves-0"),
+    "no-averaging": ("reduced", "pixels", "layers"),
+    "keeps-background": ("layer-subset", "pixels", "layers"),
+    "ignores-layers": ("layer-subset", "pixels", "layers"),
+    "ignores-region": ("region", "size", "layers"),
+    "no-halving": ("adaptation", "exit", "one-layer"),
+    "nan": ("pixel", "pixels", "invalid-empty"),
+    "one-row-short": ("layers", "size", "invalid-empty"),
+    "eight-bit": ("one-layer", "output", "invalid-empty"),
+    "writes-nothing": ("one-layer", "output", "invalid-empty"),
+    "writes-rubbish": ("one-layer", "output", "invalid-empty"),
+    "accepts-bad-crc": ("invalid-crc-texture", "exit", "layers"),
+    "accepts-trailing-bytes": ("invalid-trailing-byte", "exit", "layers"),
+    "ignores-critical-chunks": ("unsupported-chunk", "exit", "ancillary"),
+    "accepts-left-over-words": ("invalid-codes-long", "exit", "layers"),
+    "accepts-any-step": ("invalid-step-nan", "exit", "layers"),
+    "accepts-any-encoding": ("invalid-long-integer", "exit", "invalid-key-missing"),
+    "exit-code-1": ("invalid-empty", "exit", "layers"),
+    "exit-code-0": ("invalid-empty", "exit", "layers"),
+}
+
+
+def test_every_fault_has_its_catcher():
+    assert CAUGHT.keys() | {"hangs"} == wrong_decoders.FAULTS.keys()
+
+
+@pytest.mark.parametrize("fault", CAUGHT)
+@pytest.mark.filterwarnings("ignore:(invalid value|overflow|divide)")
+def test_wrong_decoders_are_caught(fault):
+    catcher, kind, spared = CAUGHT[fault]
+    decoder = functools.partial(in_process, fault=fault)
+    caught = problems(runner.run([BY_NAME[catcher]], decoder))
+    assert caught
+    assert f": {kind}: " in caught[0]
+    assert problems(runner.run([BY_NAME[spared]], decoder)) == []
+
+
+def command(*words):
+    python = shlex.quote(sys.executable)
+    return f"{python} {' '.join(words)} {{in}} {{out}} {{args}}"
+
+
+def test_a_wrong_decoder_is_caught_as_a_command(capsys, at_root):
+    wrong = command("-m", "conformance.wrong_decoders", "--fault", "ignores-holes")
+    assert runner.main(["--decoder", wrong, "--only", "hole"]) == 1
+    assert "pixels: peak" in capsys.readouterr().out
+
+
+def test_a_hanging_decoder_is_stopped(capsys, at_root):
+    wrong = command("-m", "conformance.wrong_decoders", "--fault", "hangs")
+    options = ["--decoder", wrong, "--only", "p*l", "--timeout", "0.3", "-j", "2"]
+    assert runner.main(options) == 1
+    assert "timeout: killed after 0.3 s" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("program", "problem"),
+    [
+        ("x = b'1' * (300 << 20)", "exit: code 1 instead of 0 (MemoryError)"),
+        ("import os; os.kill(os.getpid(), 11)", "exit: killed by signal 11 instead of code 0"),
+        ("pass", "output: no picture was written"),
+        ("import sys; open(sys.argv[2], 'wb')", "output: neither a PNG nor an NPY file"),
+        ("import sys; sys.exit('no\\ngood')", "exit: code 1 instead of 0 (good)"),
+    ],
+)
+def test_bad_endings_are_named(program, problem):
+    template = command("-c", shlex.quote(program))
+    decoder = command_decoder(template, 20, 200 << 20)
+    assert judge.judge(BY_NAME["pixel"], 0, decoder).problem.startswith(problem)
+
+
+def test_a_refused_file_must_not_leave_a_picture():
+    def decoder(source, target, flags):
+        target.write_bytes(b"something")
+        return Ended(4)
+
+    assert judge.judge(BY_NAME["invalid-empty"], 0, decoder).problem.startswith("output: ")
+
+
+# The runner's parts.
+
+
+def test_commands_are_expanded():
+    words = expand("a 'b c' --in={in} {out} {args}", Path("x y"), Path("o"), ["--width", "3"])
+    assert words == ["a", "b c", "--in=x y", "o", "--width", "3"]
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["--decoder", "a {in} {out}"],
+        ["--decoder", "a '{in} {out} {args}"],
+        ["--decoder", "no-such-program {in} {out} {args}"],
+        ["--only", "nothing"],
+        ["-j", "0"],
+        ["--timeout", "0"],
+    ],
+)
+def test_the_runner_refuses_senseless_options(options, capsys):
+    with pytest.raises(SystemExit, match="2"):
+        runner.main(options)
+
+
+def test_flags_follow_from_arguments():
+    args = {"region": [1, 2, 3, 4], "height": 9, "layers": ["a b", "c"], "background": False}
+    assert " ".join(flags(args)) == (
+        "--bit-depth 16 --region 1,2,3,4 --height 9 --layer a b --layer c --no-background"
+    )
+
+
+def picture(*pixel, dtype=np.uint16, shape=(3, 5)):
+    return np.broadcast_to(np.array(pixel, dtype), (*shape, len(pixel))).copy()
+
+
+@pytest.mark.parametrize("channels", [3, 4])
+def test_png_with_every_filter_is_read(channels):
+    rng = np.random.default_rng(0)
+    wanted = rng.integers(0, 65536, (7, 6, channels), np.uint16)
+    assert (pixels.read(pictures.encode_png(wanted)) == wanted).all()
+    raw = wanted.astype(">u2").view(np.uint8).reshape(7, -1)
+    step, above = 2 * channels, np.zeros(raw.shape[1], int)
+    for kind in range(5):
+        for row in raw.astype(int):
+            a = np.concatenate([np.zeros(step, int), row[:-step]])
+            c = np.concatenate([np.zeros(step, int), above[:-step]])
+            paeth = [pixels._paeth(*v) for v in zip(a, above, c, strict=True)]
+            guess = np.array([0 * a, a, above, (a + above) // 2, paeth][kind])
+            line = ((row - guess) & 255).astype(np.uint8)
+            out = pixels._unfilter(kind, line, above.astype(np.uint8), step)
+            assert (out == row).all()
+            above = row
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+@pytest.mark.parametrize("dtype", ["<u2", ">u2", "<f4"])
+def test_npy_is_read(order, dtype):
+    wanted = np.arange(60).reshape(3, 5, 4).astype(dtype, order=order)
+    file = io.BytesIO()
+    np.save(file, wanted)
+    assert (pixels.read(file.getvalue()) == wanted).all()
+    for cut in (0, 3, 9, 50, 127, -1):
+        with pytest.raises(ValueError, match=r"NPY|PNG"):
+            pixels.read(file.getvalue()[:cut])
+
+
+@pytest.mark.parametrize("shape", [(2, 2), (2, 2, 2), (0, 2, 3)])
+def test_npy_of_other_shapes_is_refused(shape):
+    file = io.BytesIO()
+    np.save(file, np.zeros(shape, np.uint16))
+    with pytest.raises(ValueError, match="shape"):
+        pixels.read(file.getvalue())
+
+
+def test_damaged_png_is_refused():
+    data = pictures.encode_png(picture(1, 2, 3))
+    for i in range(len(data)):
+        with pytest.raises(ValueError, match="PNG"):
+            pixels.read(data[:i])
+        with pytest.raises(ValueError, match=r"PNG|shape"):
+            pixels.read(data[:i] + bytes([data[i] ^ 1]) + data[i + 1 :])
+    with pytest.raises(ValueError, match="16-bit"):
+        pixels.read(pictures.encode_png(picture(1, 2, 3, dtype=np.uint8)))
+
+
+def test_differences_are_premultiplied_8_bit_levels():
+    grey = picture(32896, 32896, 32896)
+    assert judge.difference(grey, grey) == (0, 0)
+    peak, rms = judge.difference(grey, picture(0, 32896, 32896))
+    assert peak == pytest.approx(128)
+    assert rms == pytest.approx(64)
+    clear = picture(9, 9, 9, 0), picture(65535, 0, 7, 0)
+    assert judge.difference(*clear) == (0, 0)
+    opaque = picture(0.5, 0.5, 0.5, 1, dtype=np.float32)
+    assert judge.difference(opaque, picture(0.5, 0.5, 0.5, dtype=np.float32)) == (0, 0)
+    assert judge.difference(opaque, picture(0.5, 0.5, 0.5, 0, dtype=np.float32))[0] == 255
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_one_bad_number_is_enough(bad, tmp_path):
+    def decoder(source, target, flags):
+        almost = picture(0, 0, 0, dtype=np.float32)
+        almost[1, 2, 0] = bad
+        np.save(target, almost)
+        return Ended(0)
+
+    (tmp_path / "black.png").write_bytes(pictures.encode_png(picture(0, 0, 0)))
+    case = Case("c", "", (), Path(), (Render((), tmp_path / "black.png", 1e9, 1e9),), None)
+    result = judge.judge(case, 0, decoder, ".npy")
+    assert result.problem == "pixels: not all are finite numbers"
+    assert result.peak is None
