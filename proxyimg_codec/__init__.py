@@ -27,6 +27,8 @@ from .limits import Limits
 
 if TYPE_CHECKING:
     from .encoder.encode import encode as encode
+    from .encoder.masks import Region as Region
+    from .encoder.settings import Settings as Settings
     from .image import Image as Image
     from .image import Layer as Layer
     from .image import from_bytes as from_bytes
@@ -38,6 +40,8 @@ _LAZY = {
     "open": ("image", "open_image"),
     "from_bytes": ("image", "from_bytes"),
     "encode": ("encoder.encode", "encode"),
+    "Region": ("encoder.masks", "Region"),
+    "Settings": ("encoder.settings", "Settings"),
 }
 
 __all__ = [
@@ -48,6 +52,8 @@ __all__ = [
     "LimitError",
     "Limits",
     "PxiError",
+    "Region",
+    "Settings",
     "UnsupportedError",
     "UsageError",
     "encode",

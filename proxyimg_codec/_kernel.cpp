@@ -338,7 +338,8 @@ void add_prior(const Train &t, int64_t from, int64_t to, Gradients &g) {
     }
 }
 
-// Threads meet twice a step, every millisecond or less: sleeping would cost more than the work.
+// Threads meet twice a step, every millisecond or less: sleeping at once would cost more than the
+// work, spinning for long would take the processor from whoever else needs it.
 class Barrier {
     std::atomic<int> waiting{0}, round{0};
     const int threads;
@@ -350,10 +351,12 @@ class Barrier {
         if (waiting.fetch_add(1) + 1 == threads) {
             waiting.store(0);
             round.store(now + 1);
+            round.notify_all();
             return;
         }
-        for (int spins = 0; round.load() == now; spins++)
-            if (spins > 2000) std::this_thread::yield();
+        for (int spins = 0; spins < 20000; spins++)
+            if (round.load(std::memory_order_relaxed) != now) break;
+        while (round.load() == now) round.wait(now);
     }
 };
 

@@ -31,6 +31,8 @@ def arguments() -> argparse.ArgumentParser:
     add("--masks", metavar="PATH", help="folder of mask PNGs, or one label PNG: the layers to make")
     add("--max-layers", type=int, metavar="N", help="most layers found; default 4")
     add("--layers", type=int, choices=[1], help="1: one layer, no decomposition")
+    add("--segmenter", default="regions", metavar="NAME", help="who finds layers; default regions, "
+        "others are added by plug-in packages")  # fmt: skip
     add("--boundary", choices=["lsq", "chamfer"], default="lsq", help="boundary fit: least squares "
         "(default), or the slower adaptive Chamfer fit of the paper")  # fmt: skip
     add("--background", choices=["diffuse", "complete"], default="diffuse", help="hidden parts of "

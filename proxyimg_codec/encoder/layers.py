@@ -9,11 +9,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import plugins
 from ..geometry.boundary import Boundary
 from ..texture.network import Floats
 from .contours import fit_paths
 from .masks import Region, resolve
-from .segment import segment
 from .settings import Settings
 
 UNIT = 2
@@ -72,6 +72,7 @@ def plan_layers(picture: Floats, settings: Settings, masks: Sequence[Region] | N
         regions = [Region("picture", whole)]
     else:
         rgb = np.rint(picture[..., :3] * 255).astype(np.uint8)
+        segment = plugins.find("segmenters", settings.segmenter)
         regions = segment(rgb, settings.max_layers, support)
     outline = alpha if not opaque and not soft and height * width <= FINE_PIXELS else None
     layers = []

@@ -15,7 +15,6 @@ PRESETS = {"fast": 2, "default": 5, "best": 8}
 EFFORT_STEPS = (500, 1000, 2000, 5000, 10000, 16000, 24000, 40000, 60000)
 """Optimizer steps at effort 1..9; half of them with quantization in the loop."""
 
-SEGMENTERS = ("auto", "none")
 BOUNDARIES = ("lsq", "chamfer")
 BACKGROUNDS = ("diffuse", "complete")
 
@@ -27,7 +26,8 @@ class Settings:
     Attributes:
         quality: 0..100; sets density of codes, bits and width of the network.
         effort: 1..9; sets the number of optimizer steps.
-        max_layers: Most layers of the built-in decomposition; 1 = none.
+        max_layers: Most layers of the decomposition; 1 = none.
+        segmenter: Who decomposes; see `plugins`.
         feature_bits: Bits a code, 2..8; None = from quality.
         net_bits: Bits a weight, 2..8.
         boundary: ``lsq`` (least squares) or ``chamfer`` (the paper's fit).
@@ -41,6 +41,7 @@ class Settings:
     quality: float = 50.0
     effort: int = 5
     max_layers: int = 4
+    segmenter: str = "regions"
     feature_bits: int | None = None
     net_bits: int = 8
     boundary: str = "lsq"

@@ -1,0 +1,41 @@
+"""Parts that can be added by other packages, found by name.
+
+A package offers a part as an entry point in the group ``proxyimg_codec.KIND``:
+
+    [project.entry-points."proxyimg_codec.segmenters"]
+    mine = "my_package:segment"
+
+Kinds:
+    segmenters: `(rgb, max_layers, support) -> list[Region]`, as `encoder.segment.segment`.
+"""
+
+from __future__ import annotations
+
+import importlib
+from importlib.metadata import entry_points
+from typing import Any
+
+from ..errors import UsageError
+
+BUILT_IN = {"segmenters": {"regions": "proxyimg_codec.encoder.segment:segment"}}
+"""Parts of this package: kind, name, and where the object is."""
+
+
+def names(kind: str) -> list[str]:
+    """Names of all parts of a kind, built-in ones first."""
+    added = {e.name for e in entry_points(group=f"proxyimg_codec.{kind}")}
+    return [*BUILT_IN[kind], *sorted(added - set(BUILT_IN[kind]))]
+
+
+def find(kind: str, name: str) -> Any:
+    """The part of a kind with a name; built-in ones cannot be replaced.
+
+    Raises:
+        UsageError: There is no such part.
+    """
+    if name in BUILT_IN[kind]:
+        module, _, attribute = BUILT_IN[kind][name].partition(":")
+        return getattr(importlib.import_module(module), attribute)
+    for entry in entry_points(group=f"proxyimg_codec.{kind}", name=name):
+        return entry.load()
+    raise UsageError(f"{kind}: {name!r} is unknown; there are {', '.join(names(kind))}")
