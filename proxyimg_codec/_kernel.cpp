@@ -14,6 +14,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -342,10 +343,9 @@ void add_prior(const Train &t, int64_t from, int64_t to, Gradients &g) {
 // work, spinning for long would take the processor from whoever else needs it.
 class Barrier {
     std::atomic<int> waiting{0}, round{0};
-    const int threads;
 
   public:
-    explicit Barrier(int n) : threads(n) {}
+    int threads = 1;
     void wait() {
         int now = round.load();
         if (waiting.fetch_add(1) + 1 == threads) {
@@ -425,10 +425,12 @@ double pxi_train(const Train *task, const int32_t *pixels, int64_t steps, int64_
     if (t.code_max) quantize_codes(t, q_codes.data(), 0, rows);
     if (t.weight_max) quantize_weights(t, lay, q_weights.data());
 
-    const int threads = std::clamp(t.threads, 1, PARTS);
-    Barrier sync(threads);
+    Barrier sync;
+    std::atomic<bool> begun{false};
     double loss = 0;
     auto work = [&](int id) {
+        begun.wait(false);
+        const int threads = sync.threads;
         Block block(t.net);
         for (int64_t s = 0; s < steps; s++) {
             const int32_t *px = pixels + s * batch;
@@ -464,7 +466,14 @@ double pxi_train(const Train *task, const int32_t *pixels, int64_t steps, int64_
         }
     };
     std::vector<std::thread> pool;
-    for (int i = 1; i < threads; i++) pool.emplace_back(work, i);
+    try {
+        for (int i = 1; i < std::min(t.threads, PARTS); i++) pool.emplace_back(work, i);
+    } catch (const std::system_error &) {
+        // No more threads to be had: those that there are do the work.
+    }
+    sync.threads = (int)pool.size() + 1;
+    begun = true;
+    begun.notify_all();
     work(0);
     for (auto &th : pool) th.join();
     return loss / ((double)t.net.channels * batch * std::max<int64_t>(steps, 1));

@@ -8,6 +8,7 @@ completion; rim = dilated xor eroded hidden region). The network and visible cod
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING, Any
 
 import cv2
@@ -56,7 +57,7 @@ def complete(
         import torch
     except ImportError:
         raise UnsupportedError("--background complete needs torch") from None
-    torch.set_num_threads(settings.jobs)
+    torch.set_num_threads(min(settings.jobs, os.cpu_count() or 1))
     plane = problem.planes[0]
     pixels, weight = _hidden_pixels(plane, stored)
     table = torch.from_numpy(state.codes[: plane.size].copy())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ class TorchTrainer:
             ) from None
         if device == "cuda" and not torch.cuda.is_available():
             raise UnsupportedError("device cuda: torch finds no CUDA device; use --device cpu")
-        torch.set_num_threads(jobs)
+        torch.set_num_threads(min(jobs, os.cpu_count() or 1))
         self._torch, self._device, self._shape = torch, device, problem.shape
         self._first = self._tensor(problem.first).long()
         self._taps = [

@@ -61,8 +61,12 @@ def plan_layers(picture: Floats, settings: Settings, masks: Sequence[Region] | N
     height, width = picture.shape[:2]
     alpha = picture[..., 3]
     opaque = bool((alpha == 1).all())
-    soft = not opaque and _is_soft(alpha)
-    support = None if opaque else _dilate(alpha > 0, 2) if soft else alpha >= 0.5
+    translucent = _translucent(alpha)
+    soft = bool(translucent.sum() > SOFT_SHARE * (alpha > 0).sum())
+    support = None if opaque else alpha >= 0.5
+    if support is not None and soft:
+        # Crisp outlines stay where they are; only translucent parts reach beyond.
+        support |= _dilate(translucent, 3) & (alpha > 0)
     if support is not None and not support.any():
         return Plan((LayerPlan("empty", None),), 4, False)
     if masks is not None:
@@ -114,9 +118,8 @@ def _dilate(mask: NDArray[np.bool_], radius: int) -> NDArray[np.bool_]:
     return cv2.dilate(mask.astype(np.uint8), kernel) > 0
 
 
-def _is_soft(alpha: Floats) -> bool:
-    """Whether alpha is more than the smooth rim of an outline."""
+def _translucent(alpha: Floats) -> NDArray[np.bool_]:
+    """Pixels between clear and solid that are not the smooth rim of an outline."""
     inside = alpha >= 0.5
     rim = _dilate(inside, 2) & _dilate(~inside, 2)
-    soft = (alpha > 0.03) & (alpha < 0.97) & ~rim
-    return bool(soft.sum() > SOFT_SHARE * (alpha > 0).sum())
+    return (alpha > 0.03) & (alpha < 0.97) & ~rim
