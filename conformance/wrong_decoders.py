@@ -34,7 +34,7 @@ Patch = tuple[object, str, Any]
 class _Anything:
     """Equal to whatever it is compared with."""
 
-    __hash__ = None  # type: ignore[assignment]
+    __hash__ = None  # type: ignore[assignment]  # as Python does where __eq__ is defined
 
     def __eq__(self, other: object) -> bool:
         return True

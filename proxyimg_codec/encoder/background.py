@@ -84,7 +84,7 @@ def complete(
         codes = _with_hidden(table, hidden, small, plane, step, state.code_bits)
         loss = GAMMA * _variation(codes, net, plane, pixels[at], weight[at], problem.shape.octaves)
         adam.zero_grad()
-        loss.backward()  # type: ignore[no-untyped-call]
+        loss.backward()  # type: ignore[no-untyped-call]  # untyped in torch's stubs
         adam.step()
     with torch.no_grad():
         codes = _with_hidden(table, hidden, small, plane, step, state.code_bits)

@@ -91,7 +91,7 @@ def _descend(
                 there, back = apart.argmin(1), apart.argmin(0)
             loss = (curve - target[there]).square().sum() + (target - curve[back]).square().sum()
             adam.zero_grad()
-            loss.backward()  # type: ignore[no-untyped-call]
+            loss.backward()  # type: ignore[no-untyped-call]  # untyped in torch's stubs
             adam.step()
         control = control.detach()
     return control.double().numpy()
