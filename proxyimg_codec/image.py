@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -100,6 +101,14 @@ class Image:
     info: Mapping[str, Any] | None = None
     extra: tuple[Chunk, ...] = ()
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "blocks", MappingProxyType(dict(self.blocks)))
+        if self.info is not None:
+            object.__setattr__(self, "info", MappingProxyType(dict(self.info)))
+        for layer in self.layers:
+            layer.texture.codes.flags.writeable = False
+            layer.texture.stored.flags.writeable = False
+
     def render(
         self,
         *,
@@ -137,7 +146,10 @@ class Image:
             UnsupportedError: The engine is not installed.
             LimitError: The output is too large.
         """
-        dtype = np.dtype(dtype)
+        try:
+            dtype = np.dtype(dtype)
+        except TypeError:
+            raise UsageError(f"dtype {dtype!r} is not known to numpy") from None
         if dtype not in (np.uint8, np.uint16, np.float32):
             raise UsageError(f"dtype {dtype} is not uint8, uint16 or float32")
         chosen = self._select(layers, background)
@@ -167,33 +179,32 @@ class Image:
         return chosen
 
     def to_bytes(self) -> bytes:
-        """The picture as a `.pxi` file."""
-        return container.serialize(
-            container.Container(
-                {
-                    "size": [self.width, self.height],
-                    "channels": self.channels,
-                    "opaque": int(self.opaque),
-                    "depth": self.depth,
-                    "layers": len(self.layers),
-                    "networks": len(self.networks),
-                },
-                tuple(
-                    {
-                        "name": v.name,
-                        "box": list(v.box),
-                        "sampling": 0,
-                        **boundaries.encode(v.boundary),
-                    }
-                    for v in self.layers
-                ),
-                tuple(network.pack(n) for n in self.networks),
-                tuple(implicit.pack(v.texture) for v in self.layers),
-                self.blocks,
-                self.info,
-                self.extra,
-            )
+        """The picture as a `.pxi` file.
+
+        Raises:
+            LimitError: It is larger than readers accept by default.
+        """
+        file = container.Container(
+            {
+                "size": [self.width, self.height],
+                "channels": self.channels,
+                "opaque": int(self.opaque),
+                "depth": self.depth,
+                "layers": len(self.layers),
+                "networks": len(self.networks),
+            },
+            tuple(
+                {"name": v.name, "box": list(v.box), "sampling": 0, **boundaries.encode(v.boundary)}
+                for v in self.layers
+            ),
+            tuple(network.pack(n) for n in self.networks),
+            tuple(implicit.pack(v.texture) for v in self.layers),
+            self.blocks,
+            self.info,
+            self.extra,
         )
+        container.check(file, DEFAULT_LIMITS)
+        return container.serialize(file)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the picture to `path`, replacing it in one step.

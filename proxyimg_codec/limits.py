@@ -19,6 +19,7 @@ class Limits:
         networks: Decoder networks in a file.
         segments: Bézier segments in all boundaries together.
         codes: Scalar codes in all textures together, stored or not.
+        wavefronts: Columns plus twice the rows of a plane of codes: steps of its decoding.
         parameters: Parameters of all networks together.
         metadata_bytes: One metadata block after decompression.
         output_pixels: Pixels of one rendered picture.
@@ -31,6 +32,7 @@ class Limits:
     networks: int = 64
     segments: int = 1 << 16
     codes: int = 1 << 25
+    wavefronts: int = 1 << 16
     parameters: int = 1 << 22
     metadata_bytes: int = 1 << 26
     output_pixels: int = 1 << 28

@@ -11,6 +11,7 @@ import io
 import os
 import struct
 import tempfile
+import tokenize
 import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -70,7 +71,7 @@ def read(path: str | os.PathLike[str]) -> Picture:
 def _read_npy(data: bytes, name: str) -> Pixels:
     try:
         array: Pixels = np.load(io.BytesIO(data), allow_pickle=False)
-    except (ValueError, EOFError, OSError, SyntaxError):
+    except (ValueError, EOFError, OSError, SyntaxError, TypeError, tokenize.TokenError):
         raise InputError(f"{name}: not a valid NPY file without pickled objects") from None
     if array.ndim not in (2, 3) or array.size == 0:
         raise InputError(f"{name}: an array of shape {array.shape} is not a picture")

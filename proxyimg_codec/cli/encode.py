@@ -31,7 +31,7 @@ def arguments() -> argparse.ArgumentParser:
     add("--masks", metavar="PATH", help="folder of mask PNGs, or one label PNG: the layers to make")
     add("--max-layers", type=int, metavar="N", help="most layers found; default 4")
     add("--layers", type=int, choices=[1], help="1: one layer, no decomposition")
-    add("--segmenter", default="regions", metavar="NAME", help="who finds layers; default regions, "
+    add("--segmenter", metavar="NAME", help="who finds layers; default regions, "
         "others are added by plug-in packages")  # fmt: skip
     add("--boundary", choices=["lsq", "chamfer"], default="lsq", help="boundary fit: least squares "
         "(default), or the slower adaptive Chamfer fit of the paper")  # fmt: skip
@@ -40,7 +40,13 @@ def arguments() -> argparse.ArgumentParser:
     add("--feature-bits", type=int, metavar="2-8", help="bits a code; from quality by default")
     add("--net-bits", type=int, default=8, metavar="2-8", help="bits a network weight; default 8")
     add("--seed", type=int, default=0, help="seed of everything random; default 0")
-    add("-j", "--jobs", type=int, metavar="N", help="threads; all cores by default")
+    add(
+        "-j",
+        "--jobs",
+        type=int,
+        metavar="N",
+        help="threads, at most 4 of use; all cores by default",
+    )
     add("--device", choices=["cpu", "cuda"], default="cpu", help="where to fit; default cpu")
     add("--strip", action="store_true", help="leave out ICC, EXIF and XMP")
     add("-f", "--force", action="store_true", help="replace OUT if it exists")
@@ -72,6 +78,7 @@ def encode_file(args: argparse.Namespace) -> None:
 
     from ..encoder.encode import encode
     from ..encoder.masks import load_masks
+    from ..image import from_bytes
     from ..quality import psnr
 
     height, width = picture.pixels.shape[:2]
@@ -99,7 +106,8 @@ def encode_file(args: argparse.Namespace) -> None:
 
     from ..files import write_atomically
 
-    quality = psnr(picture.pixels, image)
+    # Of the file as it will be read, before it takes the place of an older one.
+    quality = psnr(picture.pixels, from_bytes(data))
     write_atomically(output, data)
     report = {
         "output": output,
@@ -133,6 +141,8 @@ def settings_from(args: argparse.Namespace) -> Any:
     from ..errors import UsageError
 
     rivals = [n for n in ("layers", "masks", "max_layers") if getattr(args, n) is not None]
+    if args.segmenter is not None and (args.layers or args.masks):
+        rivals.append("segmenter")
     if len(rivals) > 1:
         names = " and ".join(f"--{n.replace('_', '-')}" for n in rivals)
         raise UsageError(f"{names} contradict each other")

@@ -57,9 +57,6 @@ def parse(data: bytes, limits: Limits = DEFAULT_LIMITS) -> Container:
             "the first chunk is not HEAD", f"chunk {chunks[0].type}", chunks[0].offset
         )
     header = _unpack(head.FIELDS, chunks[0])
-    for name in ("layers", "networks"):
-        limits.check(name, header[name])
-    limits.check("side", max(header["size"]))
     parts: dict[str, list[Values]] = {t: [] for t in _STRUCTURE}
     fields = {layr.TYPE: layr.FIELDS, netw.TYPE: netw.FIELDS, texr.TYPE: texr.FIELDS}
     blocks: dict[str, bytes] = {}
@@ -97,7 +94,7 @@ def parse(data: bytes, limits: Limits = DEFAULT_LIMITS) -> Container:
         header, tuple(parts[layr.TYPE]), tuple(parts[netw.TYPE]), tuple(parts[texr.TYPE]),
         blocks, info, tuple(extra), sizes,
     )  # fmt: skip
-    _check(container, limits)
+    check(container, limits)
     return container
 
 
@@ -105,8 +102,17 @@ def _unpack(fields: tuple[Field, ...], chunk: Chunk) -> Values:
     return unpack(fields, chunk.payload, f"chunk {chunk.type} at byte {chunk.offset}")
 
 
-def _check(c: Container, limits: Limits) -> None:
-    """What chunks must agree on, and the budget that all of them share."""
+def check(c: Container, limits: Limits) -> None:
+    """Checks what chunks must agree on, and the budget that all of them share.
+
+    Raises:
+        FormatError: They contradict each other.
+        UnsupportedError: They need a newer reader.
+        LimitError: They exceed `limits`.
+    """
+    for name in ("layers", "networks"):
+        limits.check(name, c.head[name])
+    limits.check("side", max(c.head["size"]))
     counts = {"layers": len(c.layers), "networks": len(c.networks)}
     for name, count in counts.items():
         if count != c.head[name]:
@@ -142,6 +148,7 @@ def _check(c: Container, limits: Limits) -> None:
         if texture["network"] >= len(c.networks):
             raise FormatError(f"network {texture['network']} does not exist", "chunk TEXR")
         columns, rows = texture["grid"]
+        limits.check("wavefronts", columns + 2 * rows)
         codes += columns * rows * int(c.networks[texture["network"]]["dim"])
     limits.check("codes", codes)
 

@@ -49,16 +49,24 @@ def decompress(payload: bytes, where: str, limits: Limits) -> bytes:
         raise FormatError("metadata is not a zstd frame", where) from None
     if len(block) != values["size"]:
         raise FormatError(f"metadata does not have the stated {values['size']} bytes", where)
-    if _frame_end(values["zstd"]) != len(values["zstd"]):
+    if _frame_end(values["zstd"], where) != len(values["zstd"]):
         raise FormatError("bytes follow the zstd frame", where)
     return block
 
 
-def _frame_end(data: bytes) -> int:
-    """Length of the first zstd frame of valid `data` (RFC 8878, section 3.1.1)."""
+def _frame_end(data: bytes, where: str) -> int:
+    """Length of the zstd frame that `data` starts with (RFC 8878, section 3.1.1).
+
+    Raises:
+        FormatError: It starts with something else, or the frame is cut.
+    """
+    if data[:4] != b"\x28\xb5\x2f\xfd":
+        raise FormatError("metadata is not a zstd frame", where)
     at = int(zstandard.frame_header_size(data))
     last = False
     while not last:
+        if at + 3 > len(data):
+            raise FormatError("the zstd frame is truncated", where)
         header = int.from_bytes(data[at : at + 3], "little")
         last, kind, size = bool(header & 1), header >> 1 & 3, header >> 3
         at += 3 + (1 if kind == 1 else size)

@@ -8,7 +8,6 @@ completion; rim = dilated xor eroded hidden region). The network and visible cod
 
 from __future__ import annotations
 
-import os
 from typing import TYPE_CHECKING, Any
 
 import cv2
@@ -26,7 +25,8 @@ if TYPE_CHECKING:
     import torch
 
 GAMMA, BETA = 1e-3, 10.0
-"""Weight of the total variation, and its factor on rims (ProxyImg)."""
+"""Weight of the total variation, and its factor on rims (ProxyImg). Here nothing else is optimized
+with it, so that GAMMA itself hardly matters."""
 
 DELTA = 64
 """Canvas pixels a cell of the small grid; the paper leaves it open."""
@@ -46,7 +46,7 @@ def complete(
         problem: Its plane 0 is the back layer, covering the canvas.
         state: Fitted and with quantization steps.
         stored: bool [rows, columns] codes of the back layer that visible pixels touch.
-        settings: For the seed, device and threads.
+        settings: For the seed.
 
     Raises:
         UnsupportedError: torch is not installed.
@@ -57,7 +57,7 @@ def complete(
         import torch
     except ImportError:
         raise UnsupportedError("--background complete needs torch") from None
-    torch.set_num_threads(min(settings.jobs, os.cpu_count() or 1))
+    torch.set_num_threads(1)  # sums, and so the file, would depend on the number of threads
     plane = problem.planes[0]
     pixels, weight = _hidden_pixels(plane, stored)
     table = torch.from_numpy(state.codes[: plane.size].copy())

@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import __version__
+from ..container import meta
 from ..errors import InputError, UsageError
 from ..image import Image, Layer, Layers
+from ..limits import DEFAULT_LIMITS
 from ..texture.implicit import ImplicitTexture
 from ..texture.network import Floats, NetShape, Network
 from . import fit
@@ -66,9 +68,13 @@ def encode(
     pixels = np.asarray(pixels)
     report = progress or (lambda stage, done, total: None)
     picture, depth = to_float(pixels)
+    DEFAULT_LIMITS.check("side", max(picture.shape[:2]))
+    _check_blocks(blocks or {})
     report("layers", 0, 1)
     plan = plan_layers(picture, settings, masks)
     report("layers", 1, 1)
+    if settings.background == "complete" and not plan.opaque:
+        raise UsageError("background complete needs an opaque picture")
 
     height, width = picture.shape[:2]
     shape = settings.network(height * width, plan.channels)
@@ -93,6 +99,14 @@ def encode(
         width, height, plan.channels, plan.opaque, depth, Layers(layers), (network,),
         dict(blocks or {}), info,
     )  # fmt: skip
+
+
+def _check_blocks(blocks: Mapping[str, bytes]) -> None:
+    for name, block in blocks.items():
+        if name not in meta.BLOCKS or not block:
+            raise UsageError(
+                f"metadata block {name!r} is empty or not one of {', '.join(meta.BLOCKS)}"
+            )
 
 
 def to_float(pixels: NDArray[Any]) -> tuple[Floats, int]:
@@ -146,7 +160,7 @@ def _fit(
         settings.device, settings.jobs, step,
     )  # fmt: skip
     stored = problem.stored()
-    if settings.background == "complete" and problem.planes[0].box[:2] == (0, 0):
+    if settings.background == "complete":
         from .background import complete
 
         stored[0] = complete(problem, state, stored[0], settings)

@@ -35,6 +35,8 @@ class NativeTrainer:
         if not self._moments:
             self._moments = [np.zeros_like(a) for a in (state.codes,) * 2 + (state.weights,) * 2]
         m = self._moments
+        # Threads meet twice a step: not worth it for little work.
+        threads = min(self._jobs, max(pixels.shape[1] // 1024, 1))
         task = kernel.Train(
             kernel.Net(s.dim, s.octaves, s.hidden, s.depth, s.channels),
             kernel.Entries(at(p.base), at(p.stride), at(p.fx), at(p.fy)),
@@ -44,7 +46,7 @@ class NativeTrainer:
             at(state.weights), at(m[2]), at(m[3]),
             at(p.prior.rows), at(p.prior.next), at(p.prior.weight), len(p.prior.rows),
             at(self._plane), at(state.code_steps), at(state.row_steps),
-            _top(state.code_bits), _top(state.net_bits), self._jobs,
+            _top(state.code_bits), _top(state.net_bits), threads,
         )  # fmt: skip
         steps, batch = pixels.shape
         loss: float = lib.pxi_train(

@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import plugins
+from ..errors import InputError
 from ..geometry.boundary import Boundary
 from ..texture.network import Floats
 from .contours import fit_paths
 from .masks import Region, resolve
+from .problem import LAYERS_MAX
 from .settings import Settings
 
 UNIT = 2
@@ -22,8 +24,8 @@ UNIT = 2
 OVERLAP = 3
 """Pixels that a layer reaches under those in front of it, so that nothing shines through."""
 
-SOFT_SHARE = 0.002
-"""Share of half-transparent pixels away from outlines above which textures give alpha."""
+SOFT_PIXELS = 16
+"""Textures give alpha if that many translucent pixels hang together away from outlines."""
 
 FINE_PIXELS = 1 << 20
 """Up to this size outlines of transparent pictures are traced on a finer grid."""
@@ -62,7 +64,8 @@ def plan_layers(picture: Floats, settings: Settings, masks: Sequence[Region] | N
     alpha = picture[..., 3]
     opaque = bool((alpha == 1).all())
     translucent = _translucent(alpha)
-    soft = bool(translucent.sum() > SOFT_SHARE * (alpha > 0).sum())
+    sizes = cv2.connectedComponentsWithStats(translucent.astype(np.uint8))[2][1:, cv2.CC_STAT_AREA]
+    soft = bool(sizes.max(initial=0) >= SOFT_PIXELS)
     support = None if opaque else alpha >= 0.5
     if support is not None and soft:
         # Crisp outlines stay where they are; only translucent parts reach beyond.
@@ -70,6 +73,7 @@ def plan_layers(picture: Floats, settings: Settings, masks: Sequence[Region] | N
     if support is not None and not support.any():
         return Plan((LayerPlan("empty", None),), 4, False)
     if masks is not None:
+        _check_masks(masks)
         regions = resolve(masks, height, width, support)
     elif settings.max_layers == 1:
         whole = np.ones((height, width), bool) if support is None else support
@@ -116,6 +120,16 @@ def _boundary(mask: NDArray[np.bool_], outline: Floats | None, settings: Setting
 def _dilate(mask: NDArray[np.bool_], radius: int) -> NDArray[np.bool_]:
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1))
     return cv2.dilate(mask.astype(np.uint8), kernel) > 0
+
+
+def _check_masks(masks: Sequence[Region]) -> None:
+    if len(masks) > LAYERS_MAX:
+        raise InputError(f"{len(masks)} masks are too many; at most {LAYERS_MAX} are possible")
+    for region in masks:
+        if not 1 <= len(region.name) <= 200 or not region.name.isprintable():
+            raise InputError(f"mask name {region.name!r} must be 1..200 printable characters")
+        if region.mask.dtype != bool:
+            raise InputError(f"mask {region.name!r} is not an array of bool")
 
 
 def _translucent(alpha: Floats) -> NDArray[np.bool_]:

@@ -14,6 +14,9 @@ from ..geometry.boundary import Boundary
 from ..texture.implicit import Box, taps
 from ..texture.network import Floats, NetShape
 
+LAYERS_MAX = 64
+"""Most layers of a picture that is encoded."""
+
 KNOWN = 0.25
 """A code is known if its pixels weigh at least this share of a whole cell."""
 
@@ -100,6 +103,9 @@ class Problem:
         for offset in (0, 1):
             touched[self.base + offset] = True
             touched[self.base + self.stride + offset] = True
+        for p in self.planes:
+            if not touched[p.start : p.start + p.size].any():
+                touched[p.start] = True  # a layer that is hidden entirely keeps one code
         return [touched[p.start : p.start + p.size].reshape(p.rows, p.columns) for p in self.planes]
 
 
@@ -158,6 +164,7 @@ def build(
     pixel = np.concatenate(seen)
     order = np.argsort(pixel, kind="stable")
     ids, counts = np.unique(pixel, return_counts=True)
+    assert counts.max() <= LAYERS_MAX, "the kernel composites at most LAYERS_MAX layers in a pixel"
     base, stride, fx, fy, coverage, learn = (
         np.concatenate(p)[order] for p in zip(*parts, strict=True)
     )
@@ -213,8 +220,13 @@ def _coverage(boundary: Boundary | None, width: int, height: int) -> NDArray[np.
     if boundary is None:
         return np.full(width * height, cover.FULL, np.int32)
     paths = [
-        np.stack([cover.to_output(p[:, i], boundary.unit, 0, size, size) for i, size in axes], 1)
-        for axes in [((0, width), (1, height))]
+        np.stack(
+            [
+                cover.to_output(p[:, 0], boundary.unit, 0, width, width),
+                cover.to_output(p[:, 1], boundary.unit, 0, height, height),
+            ],
+            axis=1,
+        )
         for p in boundary.paths
     ]
     return cover.coverage(paths, 0, 0, width, height).ravel()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -51,6 +52,14 @@ class Settings:
     device: str = "cpu"
 
     def __post_init__(self) -> None:
+        try:
+            object.__setattr__(self, "quality", float(self.quality))
+            for name in ("effort", "max_layers", "net_bits", "seed", "jobs", "feature_bits"):
+                value = getattr(self, name)
+                if name != "feature_bits" or value is not None:
+                    object.__setattr__(self, name, operator.index(value))
+        except (TypeError, ValueError):
+            raise UsageError("quality must be a number, other numeric settings integers") from None
         checks = [
             (math.isfinite(self.quality) and 0 <= self.quality <= 100, "quality", "0..100"),
             (1 <= self.effort <= 9, "effort", "1..9"),
@@ -63,9 +72,6 @@ class Settings:
             (self.jobs >= 1, "jobs", "at least 1"),
             (self.device in ("cpu", "cuda"), "device", "cpu or cuda"),
         ]
-        for name in ("effort", "max_layers", "net_bits", "seed", "jobs"):
-            if not isinstance(getattr(self, name), int):
-                raise UsageError(f"{name} must be an integer")
         for good, name, allowed in checks:
             if not good:
                 raise UsageError(f"{name} is {getattr(self, name)}, but must be {allowed}")

@@ -7,7 +7,7 @@ FreeType's smooth rasterizer), nonzero rule by clamping. Everything is integer: 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
 import numpy as np
@@ -25,6 +25,9 @@ FLATNESS = 16
 """Largest distance of a chord from its curve, in 1/256 output pixel (estimate)."""
 
 MAX_LOG2_CHORDS = 8
+
+PIECES = 1 << 20
+"""Pieces of edges handled at a time; bounds memory."""
 
 SCALED_MAX = 1 << 30
 """Scaled coordinates are clamped to -SCALED_MAX .. SCALED_MAX, so that 64 bits are enough."""
@@ -88,9 +91,23 @@ def coverage(paths: Sequence[Ints], x0: int, y0: int, width: int, height: int) -
         corner = np.array([x0 * ONE, y0 * ONE])
         start = np.concatenate([e[0] for e in edges]) - corner
         end = np.concatenate([e[1] for e in edges]) - corner
-        _accumulate(cells, *_split_rows(start, end, height), width)
+        for at in _batches(np.abs(end[:, 1] - start[:, 1]) // ONE + 2, height + 1):
+            row, x_in, x_out, dy = _split_rows(start[at], end[at], height)
+            for part in _batches(np.abs(x_out - x_in) // ONE + 2, width + 1):
+                _accumulate(cells, row[part], x_in[part], x_out[part], dy[part], width)
     total = np.cumsum(cells.reshape(height, width + 2), axis=1)[:, 1 : width + 1]
     return np.minimum(np.abs(total), FULL).astype(np.int32)
+
+
+def _batches(pieces: Ints, most: int) -> Iterator[slice]:
+    """Slices of items that together make about `PIECES` pieces; an item makes at most `most`."""
+    total = np.cumsum(np.minimum(pieces, most))
+    start = 0
+    while start < len(pieces):
+        done = int(total[start - 1]) if start else 0
+        stop = max(int(np.searchsorted(total, done + PIECES, side="right")), start + 1)
+        yield slice(start, stop)
+        start = stop
 
 
 def _split_rows(start: Ints, end: Ints, height: int) -> tuple[Ints, Ints, Ints, Ints]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -79,7 +80,14 @@ def make_view(
         UsageError: Contradictory, empty or non-finite request, or a region outside the canvas.
         LimitError: More than `SIDE_MAX` columns or rows.
     """
-    x, y, w, h = region or (0, 0, *canvas)
+    try:
+        x, y, w, h = map(operator.index, region or (0, 0, *canvas))
+        width = None if width is None else operator.index(width)
+        height = None if height is None else operator.index(height)
+    except (TypeError, ValueError):
+        raise UsageError(
+            "width, height and the four numbers of a region must be integers"
+        ) from None
     if w < 1 or h < 1 or x < 0 or y < 0 or x + w > canvas[0] or y + h > canvas[1]:
         raise UsageError(
             f"region {x},{y},{w},{h} is empty or leaves the canvas of {canvas[0]}x{canvas[1]}"
