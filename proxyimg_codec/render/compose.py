@@ -46,7 +46,9 @@ def render(
             w = min(tile_w, view.width - column)
             box = (column * sx, row * sy, w * sx, h * sy)
             samples = _tile(image, view, layers, outlines, engine, box)
-            out(row, column, samples.reshape(h, sy, w, sx, 4).mean((1, 3), dtype=np.float32))
+            if sx * sy > 1:
+                samples = samples.reshape(h, sy, w, sx, 4).mean((1, 3), dtype=np.float32)
+            out(row, column, samples)
 
 
 def _outline(layer: Layer, view: View) -> list[NDArray[np.int64]] | None:
@@ -104,8 +106,8 @@ def premultiplied(output: Floats) -> Floats:
     0..1 and colour in 0..alpha.
     """
     result = np.ones((len(output), 4), np.float32)
-    np.nan_to_num(output, copy=False)
     if output.shape[1] == 4:
-        np.clip(output[:, 3], 0, 1, out=result[:, 3])
-    np.clip(output[:, :3], 0, result[:, 3:], out=result[:, :3])
+        result[:, 3] = np.fmin(np.fmax(output[:, 3], 0), 1)
+    # Unlike clip, fmax takes the number where the other is none.
+    result[:, :3] = np.fmin(np.fmax(output[:, :3], 0), result[:, 3:])
     return result

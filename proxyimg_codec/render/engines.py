@@ -57,8 +57,8 @@ def run_ort(texture: ImplicitTexture, network: Network, taps: Taps) -> Floats:
 
     run = session(network)
     out = np.empty((len(taps.base), network.shape.channels), np.float32)
-    for i in range(0, len(out), 4 * _CHUNK):
-        at = slice(i, i + 4 * _CHUNK)
+    for i in range(0, len(out), 2 * _CHUNK):
+        at = slice(i, i + 2 * _CHUNK)
         part = Taps(taps.base[at], taps.fx[at], taps.fy[at], taps.stride)
         out[at] = run(texture.features(part))
     return out

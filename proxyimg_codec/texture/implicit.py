@@ -91,12 +91,12 @@ class ImplicitTexture:
 
     def features(self, at: Taps) -> Floats:
         """Features [N, D] at N points."""
-        table = self.table
         fx, fy = at.fx[:, None], at.fy[:, None]
-        top = table[at.base] * (1 - fx)
-        top += table[at.base + 1] * fx
-        bottom = table[at.base + at.stride] * (1 - fx)
-        bottom += table[at.base + at.stride + 1] * fx
+        top, right = self.table.take(at.base, 0), self.table.take(at.base + 1, 0)
+        top += (right - top) * fx
+        below = at.base + at.stride
+        bottom, right = self.table.take(below, 0), self.table.take(below + 1, 0)
+        bottom += (right - bottom) * fx
         top += (bottom - top) * fy
         return top
 
