@@ -14,6 +14,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import numpy as np
 
@@ -87,8 +88,13 @@ def write(folder: Path = FOLDER) -> None:
     Raises:
         RuntimeError: The package itself does not do with an input what the case demands.
     """
-    os.environ["PROXYIMG_NO_KERNEL"] = "1"
+    with mock.patch.dict(os.environ, PROXYIMG_NO_KERNEL="1"):
+        kernel.library.cache_clear()
+        _write(folder)
     kernel.library.cache_clear()
+
+
+def _write(folder: Path) -> None:
     made = build()
     shutil.rmtree(folder, ignore_errors=True)
     for name, (data, description) in made.items():
