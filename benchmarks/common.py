@@ -62,14 +62,6 @@ def centre_crop(pixels: Pixels, size: int = 512) -> Pixels:
     return np.ascontiguousarray(pixels[y : y + size, x : x + size])
 
 
-def one_thread() -> None:
-    """Keeps array libraries on one thread; call before they are first used for work."""
-    import os
-
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ[name] = "1"
-
-
 def run_limited(code: str, threads: int | None = None) -> tuple[str, float, float]:
     """Runs Python code in a child; its output, peak memory in GB, and CPU seconds."""
     import os

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from ..geometry import coverage as cover
 from ..geometry.boundary import Boundary
+from ..render.compose import outline
+from ..render.view import View
 from ..texture.implicit import Box, taps
 from ..texture.network import Floats, NetShape
 
@@ -217,16 +219,7 @@ def _prior(
 
 
 def _coverage(boundary: Boundary | None, width: int, height: int) -> NDArray[np.int32]:
-    if boundary is None:
+    paths = outline(boundary, View(0, 0, width, height, width, height))
+    if paths is None:
         return np.full(width * height, cover.FULL, np.int32)
-    paths = [
-        np.stack(
-            [
-                cover.to_output(p[:, 0], boundary.unit, 0, width, width),
-                cover.to_output(p[:, 1], boundary.unit, 0, height, height),
-            ],
-            axis=1,
-        )
-        for p in boundary.paths
-    ]
     return cover.coverage(paths, 0, 0, width, height).ravel()

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry import coverage as cover
+from ..geometry.boundary import Boundary
 from ..texture.network import Floats
 from .engines import Engine
 from .view import View
@@ -37,7 +38,7 @@ def render(
         out: Called with row, column and float32 [h, w, 4] premultiplied colour and alpha in 0..1.
     """
     sx, sy = view.supersampling
-    outlines = [_outline(layer, view) for layer in layers]
+    outlines = [outline(layer.boundary, view) for layer in layers]
     tile_w = max(min(view.width, TILE_SAMPLES // (sx * sy)), 1)
     tile_h = max(TILE_SAMPLES // (tile_w * sx * sy), 1)
     for row in range(0, view.height, tile_h):
@@ -51,12 +52,12 @@ def render(
             out(row, column, samples)
 
 
-def _outline(layer: Layer, view: View) -> list[NDArray[np.int64]] | None:
-    """The layer's paths on the sample grid, in 1/256 sample; None covers everything."""
-    if layer.boundary is None:
+def outline(boundary: Boundary | None, view: View) -> list[NDArray[np.int64]] | None:
+    """The paths on the sample grid of `view`, in 1/256 sample; None covers everything."""
+    if boundary is None:
         return None
     sx, sy = view.supersampling
-    unit = layer.boundary.unit
+    unit = boundary.unit
     return [
         np.stack(
             [
@@ -65,7 +66,7 @@ def _outline(layer: Layer, view: View) -> list[NDArray[np.int64]] | None:
             ],
             axis=1,
         )
-        for p in layer.boundary.paths
+        for p in boundary.paths
     ]
 
 
@@ -82,11 +83,11 @@ def _tile(
     xs, ys = view.columns(x0, x0 + w), view.rows(y0, y0 + h)
     result = np.zeros((h * w, 4), np.float32)
     clear = np.ones(h * w, np.float32)
-    for layer, outline in zip(reversed(layers), reversed(outlines), strict=True):
-        if outline is None:
+    for layer, paths in zip(reversed(layers), reversed(outlines), strict=True):
+        if paths is None:
             covered = np.full(h * w, cover.FULL, np.int32)
         else:
-            covered = cover.coverage(outline, x0, y0, w, h).ravel()
+            covered = cover.coverage(paths, x0, y0, w, h).ravel()
         at = np.flatnonzero((covered > 0) & (clear > 0))
         if not len(at):
             continue
