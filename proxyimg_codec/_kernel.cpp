@@ -24,8 +24,19 @@
 
 #include "_kernel_decode.h"
 
-typedef float vec __attribute__((vector_size(64)));
-static const int LANES = 16, BLOCK = 256, NV = BLOCK / LANES, PARTS = 4, MAX_LAYERS = 10, SPAN = 32;
+// The widest vectors that the machine has: gcc makes poor code of wider ones. A tile of TILE x 2
+// vectors of sums, two of inputs and a factor fill the registers.
+#if defined(__AVX512F__)
+static const int LANES = 16, TILE = 8;
+#elif defined(__AVX__)
+static const int LANES = 8, TILE = 4;
+#else
+static const int LANES = 4, TILE = 4;
+#endif
+typedef float vec __attribute__((vector_size(4 * LANES)));
+typedef int32_t ints __attribute__((vector_size(4 * LANES)));
+typedef float vec8 __attribute__((vector_size(32), aligned(4), may_alias));  // anywhere in memory
+static const int BLOCK = 256, NV = BLOCK / LANES, PARTS = 4, MAX_LAYERS = 10, SPAN = 32;
 static const float PI = 3.14159265358979f;
 
 extern "C" {
@@ -86,32 +97,32 @@ struct Buffer {  // 64-byte aligned floats
     Buffer(const Buffer &) = delete;
 };
 
-// out[j] = bias[j] + sum_i w[j * ws + i * wi] * in[i], four rows by four vectors at a time.
-void matmul(const float *w, int ws, int wi, const float *bias, const vec *in, vec *out, int ni, int no) {
-    for (int c = 0; c < NV; c += 4) {
-        int j = 0;
-        for (; j + 4 <= no; j += 4) {
-            vec a[4][4];
-            for (int r = 0; r < 4; r++)
-                for (int k = 0; k < 4; k++) a[r][k] = (vec){} + (bias ? bias[j + r] : 0.f);
+// out[j] = bias[j] + sum_i w[j * ws + i * wi] * in[i], with `relu` negative ones replaced by 0.
+// Takes R rows by two vectors at a time, and what rows are left R / 2 at a time.
+template <int R = TILE>
+void matmul(const float *w, int ws, int wi, const float *bias, bool relu, const vec *in, vec *out, int ni,
+            int no) {
+    for (; no >= R; no -= R, w += R * ws, bias += bias ? R : 0, out += R * NV)
+        for (int c = 0; c < NV; c += 2) {
+            vec a[R][2];
+            // Without the pragmas gcc keeps the sums in memory.
+#pragma GCC unroll 8
+            for (int r = 0; r < R; r++) a[r][0] = a[r][1] = (vec){} + (bias ? bias[r] : 0.f);
             for (int i = 0; i < ni; i++) {
-                const vec *x = in + i * NV + c;
-                for (int r = 0; r < 4; r++) {
-                    float s = w[(j + r) * ws + i * wi];
-                    for (int k = 0; k < 4; k++) a[r][k] += s * x[k];
+                const vec x = in[i * NV + c], y = in[i * NV + c + 1];
+#pragma GCC unroll 8
+                for (int r = 0; r < R; r++) {
+                    const float s = w[r * ws + i * wi];
+                    a[r][0] += s * x, a[r][1] += s * y;
                 }
             }
-            for (int r = 0; r < 4; r++)
-                for (int k = 0; k < 4; k++) out[(j + r) * NV + c + k] = a[r][k];
+#pragma GCC unroll 8
+            for (int r = 0; r < R; r++)
+                for (int k = 0; k < 2; k++)
+                    out[r * NV + c + k] = relu ? (a[r][k] < 0 ? (vec){} : a[r][k]) : a[r][k];
         }
-        for (; j < no; j++) {
-            vec a[4];
-            for (int k = 0; k < 4; k++) a[k] = (vec){} + (bias ? bias[j] : 0.f);
-            for (int i = 0; i < ni; i++)
-                for (int k = 0; k < 4; k++) a[k] += w[j * ws + i * wi] * in[i * NV + c + k];
-            for (int k = 0; k < 4; k++) out[j * NV + c + k] = a[k];
-        }
-    }
+    if constexpr (R > 1)
+        if (no) matmul<R / 2>(w, ws, wi, bias, relu, in, out, ni, no);
 }
 
 float sum(vec v) {
@@ -153,15 +164,16 @@ void outer(const vec *d, const vec *x, float *dw, float *db, int ni, int no) {
 }
 
 // sin(pi x) and cos(pi x): reduced to |r| <= 1/2, Taylor polynomials (error < 1e-7).
-inline void sincospi(const float *x, float *s, float *c, int n) {
-    for (int i = 0; i < n; i++) {
-        float k = nearbyintf(x[i]), r = (x[i] - k) * PI, r2 = r * r;
-        float sign = 1.f - 2.f * (float)((int)k & 1);
-        s[i] = sign * r * (1 + r2 * (-1.f / 6 + r2 * (1.f / 120 + r2 * (-1.f / 5040 +
-               r2 * (1.f / 362880 - r2 * (1.f / 39916800))))));
-        c[i] = sign * (1 + r2 * (-.5f + r2 * (1.f / 24 + r2 * (-1.f / 720 + r2 * (1.f / 40320 +
-               r2 * (-1.f / 3628800 + r2 * (1.f / 479001600)))))));
-    }
+inline void sincospi(vec x, vec &s, vec &c) {
+    // The largest number below 1/2, since adding 1/2 itself would round large odd numbers up.
+    const vec half = (vec){} + .49999997f;
+    const ints k = __builtin_convertvector(x + (x < 0 ? -half : half), ints);
+    const vec r = (x - __builtin_convertvector(k, vec)) * PI, r2 = r * r;
+    const vec sign = 1 - 2 * __builtin_convertvector(k & 1, vec);
+    s = sign * r * (1 + r2 * (-1.f / 6 + r2 * (1.f / 120 + r2 * (-1.f / 5040 +
+        r2 * (1.f / 362880 - r2 * (1.f / 39916800))))));
+    c = sign * (1 + r2 * (-.5f + r2 * (1.f / 24 + r2 * (-1.f / 720 + r2 * (1.f / 40320 +
+        r2 * (-1.f / 3628800 + r2 * (1.f / 479001600)))))));
 }
 
 // Gradients of one slice of a batch. Codes come in spans of SPAN rows, and only spans that were
@@ -193,34 +205,48 @@ struct Block {  // the working memory of one thread
 
     void gather(const float *codes, const Entries &e, int64_t start, int n, const int32_t *index) {
         const int D = net.dim;
-        for (int p = 0; p < BLOCK; p++) {
-            int64_t k = p < n ? (index ? index[p] : start + p) : (index ? index[0] : start);
-            const float *a = codes + (int64_t)e.base[k] * D, *b = a + (int64_t)e.stride[k] * D;
-            float x = e.fx[k], y = e.fy[k], w11 = x * y, w10 = x - w11, w01 = y - w11, w00 = 1 - x - w01;
-            for (int d = 0; d < D; d++)
-                feature.p[d * BLOCK + p] = w00 * a[d] + w10 * a[D + d] + w01 * b[d] + w11 * b[D + d];
+        for (int d = 0; d < D; d += 8)
+            for (int p = 0; p < BLOCK; p++) {
+                int64_t k = p < n ? (index ? index[p] : start + p) : (index ? index[0] : start);
+                const float *a = codes + (int64_t)e.base[k] * D + d, *b = a + (int64_t)e.stride[k] * D;
+                float x = e.fx[k], y = e.fy[k], w11 = x * y, w10 = x - w11, w01 = y - w11, w00 = 1 - x - w01;
+                float *to = feature.p + d * BLOCK + p;
+                if (d + 8 <= D) {
+                    const vec8 f = w00 * *(vec8 *)a + w10 * *(vec8 *)(a + D) + w01 * *(vec8 *)b +
+                                   w11 * *(vec8 *)(b + D);
+                    for (int i = 0; i < 8; i++) to[i * BLOCK] = f[i];
+                } else {
+                    for (int i = 0; i < D - d; i++)
+                        to[i * BLOCK] = w00 * a[i] + w10 * a[D + i] + w01 * b[i] + w11 * b[D + i];
+                }
+            }
+    }
+
+    // Feature by feature, which keeps few streams to memory at a time: those of the octaves lie
+    // a power of two apart and would push each other out of the cache.
+    void encode() {
+        const int n = net.dim * NV;
+        for (int d = 0; d < n; d += NV) {
+            vec *to = (vec *)encoded.p + d, *s = to + n, *c = s + n;
+            std::memcpy(to, (vec *)feature.p + d, NV * sizeof(vec));
+            if (net.octaves)
+                for (int v = 0; v < NV; v++) sincospi(to[v], s[v], c[v]);
+            for (int k = 1; k < net.octaves; k++, s += 2 * n, c += 2 * n)
+                for (int v = 0; v < NV; v++) {
+                    const vec twice = 2 * s[v];
+                    s[2 * n + v] = twice * c[v];
+                    c[2 * n + v] = 1 - twice * s[v];
+                }
         }
     }
 
     void forward(const float *weights) {
-        const int n = net.dim * BLOCK;
-        std::memcpy(encoded.p, feature.p, n * sizeof(float));
-        if (net.octaves) {
-            float *s = encoded.p + n, *c = s + n;
-            sincospi(feature.p, s, c, n);
-            for (int k = 1; k < net.octaves; k++, s += 2 * n, c += 2 * n)
-                for (int i = 0; i < n; i++) {
-                    s[2 * n + i] = 2 * s[i] * c[i];
-                    c[2 * n + i] = 1 - 2 * s[i] * s[i];
-                }
-        }
+        encode();
         const float *in = encoded.p;
         for (int l = 0; l < lay.layers; l++) {
             float *out = act(l);
-            matmul(weights + lay.weight[l], lay.in[l], 1, weights + lay.bias[l], (const vec *)in, (vec *)out,
-                   lay.in[l], lay.out[l]);
-            if (l + 1 < lay.layers)
-                for (int i = 0; i < lay.out[l] * BLOCK; i++) out[i] = std::max(out[i], 0.f);
+            matmul(weights + lay.weight[l], lay.in[l], 1, weights + lay.bias[l], l + 1 < lay.layers,
+                   (const vec *)in, (vec *)out, lay.in[l], lay.out[l]);
             in = out;
         }
     }
@@ -233,7 +259,8 @@ struct Block {  // the working memory of one thread
             outer((vec *)d, (const vec *)in, g_weights + lay.weight[l], g_weights + lay.bias[l], lay.in[l],
                   lay.out[l]);
             float *to = l ? next : d_encoded.p;
-            matmul(weights + lay.weight[l], 1, lay.in[l], nullptr, (vec *)d, (vec *)to, lay.out[l], lay.in[l]);
+            matmul(weights + lay.weight[l], 1, lay.in[l], nullptr, false, (vec *)d, (vec *)to, lay.out[l],
+                   lay.in[l]);
             if (l) {
                 for (int i = 0; i < lay.in[l] * BLOCK; i++) to[i] = in[i] > 0 ? to[i] : 0.f;
                 std::swap(d, next);

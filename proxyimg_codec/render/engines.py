@@ -7,7 +7,7 @@ readable reference that the others are judged by.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -25,15 +25,8 @@ _CHUNK = 4096
 def run_numpy(texture: ImplicitTexture, network: Network, taps: Taps) -> Floats:
     """Plain numpy."""
     out = np.empty((len(taps.base), network.shape.channels), np.float32)
-    # Matrix products round differently for different sizes. All have one size, so that a point's
-    # colour does not depend on which others are asked for.
-    features = np.zeros((_CHUNK, network.shape.dim), np.float32)
-    for i in range(0, len(out), _CHUNK):
-        at = slice(i, i + _CHUNK)
-        part = Taps(taps.base[at], taps.fx[at], taps.fy[at], taps.stride)
-        count = len(part.base)
-        features[:count] = texture.features(part)
-        out[at] = network(features)[:count]
+    for at, part in _chunks(taps):
+        out[at] = network(texture.features(part))
     return out
 
 
@@ -57,11 +50,24 @@ def run_ort(texture: ImplicitTexture, network: Network, taps: Taps) -> Floats:
 
     run = session(network)
     out = np.empty((len(taps.base), network.shape.channels), np.float32)
-    for i in range(0, len(out), 2 * _CHUNK):
-        at = slice(i, i + 2 * _CHUNK)
-        part = Taps(taps.base[at], taps.fx[at], taps.fy[at], taps.stride)
+    for at, part in _chunks(taps):
         out[at] = run(texture.features(part))
     return out
+
+
+def run_features(network: Network, features: Floats) -> Floats:
+    """Outputs [N, channels] for features [N, D] that do not come from taps, in plain numpy."""
+    out = np.empty((len(features), network.shape.channels), np.float32)
+    for i in range(0, len(out), _CHUNK):
+        at = slice(i, i + _CHUNK)
+        out[at] = network(features[at])
+    return out
+
+
+def _chunks(taps: Taps) -> Iterator[tuple[slice, Taps]]:
+    for i in range(0, len(taps.base), _CHUNK):
+        at = slice(i, i + _CHUNK)
+        yield at, Taps(taps.base[at], taps.fx[at], taps.fy[at], taps.stride)
 
 
 ENGINES: dict[str, Engine] = {"numpy": run_numpy, "native": run_native, "ort": run_ort}

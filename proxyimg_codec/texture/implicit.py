@@ -41,16 +41,24 @@ def taps(x: NDArray[np.float64], y: NDArray[np.float64], box: Box, columns: int,
     Points outside the box take the value at its rim.
     """
     x0, y0, width, height = box
-    gx = np.clip((x - x0) * ((columns - 1) / width), 0, columns - 1)
-    gy = np.clip((y - y0) * ((rows - 1) / height), 0, rows - 1)
-    ix = np.minimum(gx.astype(np.int32), columns - 2)
-    iy = np.minimum(gy.astype(np.int32), rows - 2)
-    return Taps(
-        iy * np.int32(columns) + ix,
-        (gx - ix).astype(np.float32),
-        (gy - iy).astype(np.float32),
-        columns,
-    )
+    ix, fx = _position(x, x0, width, columns)
+    iy, fy = _position(y, y0, height, rows)
+    iy *= columns
+    iy += ix
+    return Taps(iy, fx, fy, columns)
+
+
+def _position(
+    points: NDArray[np.float64], start: int, extent: int, codes: int
+) -> tuple[NDArray[np.int32], Floats]:
+    """Codes before points on one axis, and fractions; in place, for the sake of the cache."""
+    grid = points - start
+    grid *= (codes - 1) / extent
+    np.clip(grid, 0, codes - 1, out=grid)
+    before = grid.astype(np.int32)
+    np.minimum(before, codes - 2, out=before)
+    grid -= before
+    return before, grid.astype(np.float32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +85,11 @@ class ImplicitTexture:
         return self.codes.shape[2], self.codes.shape[1]
 
     @cached_property
+    def packed(self) -> Mapping[str, Any]:
+        """The fields of TEXR: those it was read from, or coded anew."""
+        return pack(self)
+
+    @cached_property
     def table(self) -> Floats:
         """Dequantized codes [rows * columns, D], holes filled by the normative diffusion."""
         filled = fill(self.codes, self.stored)
@@ -91,14 +104,22 @@ class ImplicitTexture:
 
     def features(self, at: Taps) -> Floats:
         """Features [N, D] at N points."""
-        fx, fy = at.fx[:, None], at.fy[:, None]
-        top, right = self.table.take(at.base, 0), self.table.take(at.base + 1, 0)
-        top += (right - top) * fx
-        below = at.base + at.stride
-        bottom, right = self.table.take(below, 0), self.table.take(below + 1, 0)
-        bottom += (right - bottom) * fx
-        top += (bottom - top) * fy
-        return top
+        dim = self.table.shape[1]
+        # Repeated, because numpy broadcasts slowly along short rows.
+        fx, fy = (f.repeat(dim).reshape(-1, dim) for f in (at.fx, at.fy))
+        base = at.base.astype(np.intp)
+        top = _mix(self.table.take(base, 0), self.table.take(base + 1, 0), fx)
+        base += at.stride
+        bottom = _mix(self.table.take(base, 0), self.table.take(base + 1, 0), fx)
+        return _mix(top, bottom, fy)
+
+
+def _mix(a: Floats, b: Floats, share: Floats) -> Floats:
+    """The mixture a + (b - a) * share, in the memory of both."""
+    b -= a
+    b *= share
+    a += b
+    return a
 
 
 def pack(texture: ImplicitTexture) -> dict[str, Any]:
@@ -121,15 +142,20 @@ def pack(texture: ImplicitTexture) -> dict[str, Any]:
 
 
 def unpack(
-    fields: Mapping[str, Any], networks: tuple[Network, ...], where: str = "chunk TEXR"
+    fields: Mapping[str, Any],
+    networks: tuple[Network, ...],
+    where: str = "chunk TEXR",
+    sampling: int = 0,
 ) -> ImplicitTexture:
-    """Inverse of `pack`; `networks` are those of the file.
+    """Inverse of `pack`; `networks` are those of the file, `sampling` is the layer's.
 
     Raises:
         FormatError: Corrupt streams, wrong lengths, or no stored code at all.
     """
     columns, rows = fields["grid"]
     dim = networks[fields["network"]].shape.dim
+    if sampling == 1:  # a local and a global feature
+        dim //= 2
     steps = read_halves(fields["steps"], dim, where, positive=True)
     stored = np.ones((rows, columns), bool)
     if fields["stored"]:
@@ -138,6 +164,8 @@ def unpack(
             raise FormatError("the mask of stored codes is full or empty", where)
     values = arrays.decode(fields["codes"], (dim, rows, columns), fields["bits"], stored)
     codes = (values.astype(np.int16) - (1 << (fields["bits"] - 1))).astype(np.int8)
-    return ImplicitTexture(
+    texture = ImplicitTexture(
         fields["network"], fields["bits"], steps, np.where(stored, codes, np.int8(0)), stored
     )
+    texture.__dict__["packed"] = fields
+    return texture

@@ -17,6 +17,13 @@ from ..errors import FormatError
 
 Floats = NDArray[np.float32]
 
+BLOCK, LARGE_BLOCK = 64, 4096
+"""Points a matrix product. BLAS takes a small product as it is and on one thread; where layers are
+large, copies in an order of its own and the work of other threads are worth their cost."""
+
+SMALL = 1 << 18
+"""Most multiplications of a product of `BLOCK` points."""
+
 
 @dataclass(frozen=True)
 class NetShape:
@@ -82,15 +89,32 @@ class Network:
             for w, s, b in zip(self.weights, steps, biases, strict=True)
         ]
 
+    @cached_property
+    def packed(self) -> Mapping[str, Any]:
+        """The fields of NETW: those it was read from, or coded anew."""
+        return pack(self)
+
     def __call__(self, features: Floats) -> Floats:
-        """Outputs [N, channels] for features [N, D], not clamped."""
-        x = encode_features(features, self.shape.octaves)
+        """Outputs [N, channels] for features [N, D], not clamped.
+
+        Those of a point do not depend on the other points: matrix products round differently for
+        different sizes, so all are of as many points. (Where BLAS rounds even by place within a
+        product, as OpenBLAS does on machines with AVX2 only, a last bit may differ.)
+        """
+        n, d = features.shape
+        small = all(i * o * BLOCK <= SMALL for i, o in self.shape.layers)
+        block = BLOCK if small else LARGE_BLOCK
+        padded = np.zeros((d, -(-n // block) * block), np.float32)
+        padded[:, :n] = features.T
+        x = encode_features(padded.T, self.shape.octaves).T
+        x = x.reshape(len(x), -1, block).swapaxes(0, 1)  # [blocks, inputs, block]
         for i, (weight, bias) in enumerate(self.layers):
-            x = x @ weight.T
-            x += bias
+            x = weight @ x
+            # Both are repeated, because numpy broadcasts slowly along short rows.
+            x += bias.repeat(block).reshape(-1, block)
             if i + 1 < len(self.layers):
-                np.maximum(x, 0, out=x)
-        return x
+                np.maximum(x, np.zeros(x.shape[1:], np.float32), out=x)
+        return x.swapaxes(1, 2).reshape(-1, self.shape.channels)[:n]
 
 
 def encode_features(features: Floats, octaves: int) -> Floats:
@@ -98,23 +122,25 @@ def encode_features(features: Floats, octaves: int) -> Floats:
 
     Order: features, then for each octave k = 0..L-1 sin(2^k pi f) and cos(2^k pi f), each D wide;
     octaves above the first follow from the double-angle formulas (ProxyImg, frequency encoding
-    of features).
+    of features). In memory the points run fastest, and so had those of `features` better.
     """
-    n, d = features.shape
-    out = np.empty((2 * octaves + 1, n, d), np.float32)
-    out[0] = features
+    f = features.T
+    out = np.empty((2 * octaves + 1, *f.shape), np.float32)
+    out[0] = f
     if octaves:
         # Reduced to |r| <= 1/2 before multiplying by pi, as exact as float32 allows.
-        turns = np.rint(features)
-        angle = (features - turns) * np.float32(math.pi)
-        sign = (1 - 2 * np.abs(turns % 2)).astype(np.float32)
+        turns = np.rint(f)
+        half = turns / 2
+        sign = 1 - 4 * np.abs(half - np.rint(half))  # -1 for odd turns
+        angle = (f - turns) * np.float32(math.pi)
         np.multiply(np.sin(angle), sign, out=out[1])
         np.multiply(np.cos(angle), sign, out=out[2])
     for k in range(1, octaves):
         s, c = out[2 * k - 1], out[2 * k]
-        np.multiply(2 * s, c, out=out[2 * k + 1])
-        np.subtract(1, 2 * s * s, out=out[2 * k + 2])
-    return np.concatenate(list(out), axis=1)
+        twice = 2 * s
+        np.multiply(twice, c, out=out[2 * k + 1])
+        np.subtract(1, twice * s, out=out[2 * k + 2])
+    return out.reshape(len(out) * len(f), len(features)).T
 
 
 def pack(network: Network) -> dict[str, Any]:
@@ -158,7 +184,9 @@ def unpack(fields: Mapping[str, Any], where: str = "chunk NETW") -> Network:
         at = end
     if at != len(data):
         raise FormatError("bytes follow the weights", where)
-    return Network(shape, fields["bits"], tuple(weights), steps, biases)
+    network = Network(shape, fields["bits"], tuple(weights), steps, biases)
+    network.__dict__["packed"] = fields
+    return network
 
 
 def read_halves(data: bytes, count: int, where: str, positive: bool = False) -> NDArray[np.float16]:

@@ -1,7 +1,9 @@
 import numpy as np
 import pytest
 
+from proxyimg_codec import kernel
 from proxyimg_codec.errors import FormatError
+from proxyimg_codec.render import engines
 from proxyimg_codec.texture.implicit import ImplicitTexture, pack, taps, unpack
 from tests.texture.test_network import NetShape, random_network
 
@@ -47,6 +49,41 @@ def test_features_are_bilinear_and_clamped():
     assert np.allclose(f[0], (middle[:, 1] + middle[:, 2]) / 2, atol=1e-6)
     assert np.allclose(f[1], middle[:, 0], atol=1e-6)
     assert np.allclose(f[2], middle[:, -1], atol=1e-6)
+
+
+def test_features_between_four_codes():
+    t = texture()
+    values = np.moveaxis(t.codes * t.steps.astype(np.float32)[:, None, None], 0, -1)
+    x, y = np.array([21.0, 70.0]), np.array([12.0, 49.0])  # tenths of a column and of a row
+    f = t.features(t.taps(x, y, (0, 0, 80, 50)))
+    for k, (ix, iy, fx, fy) in enumerate([(2, 1, 0.1, 0.2), (7, 4, 0.0, 0.9)]):
+        top = values[iy, ix] * (1 - fx) + values[iy, ix + 1] * fx
+        bottom = values[iy + 1, ix] * (1 - fx) + values[iy + 1, ix + 1] * fx
+        assert np.allclose(f[k], top * (1 - fy) + bottom * fy, atol=1e-6)
+
+
+@pytest.mark.skipif(not kernel.available(), reason="kernel not compiled")
+@pytest.mark.parametrize(
+    "shape",
+    [
+        NetShape(8, 5, 32, 2, 3), NetShape(19, 1, 15, 1, 4), NetShape(16, 0, 8, 3, 3),
+        NetShape(3, 6, 1, 2, 4),
+    ],
+)  # fmt: skip
+def test_kernel_does_what_numpy_does(shape):
+    """Whole vectors of features and tiles of rows, and what is left; any count of points."""
+    rng = np.random.default_rng(1)
+    codes = rng.integers(-8, 8, (shape.dim, 7, 9)).astype(np.int8)
+    steps = np.full(shape.dim, 0.3, np.float16)
+    plane = ImplicitTexture(0, 4, steps, codes, np.ones((7, 9), bool))
+    network = random_network(shape, 8)
+    at = plane.taps(rng.uniform(-5, 90, 1000), rng.uniform(-5, 60, 1000), (0, 0, 80, 50))
+    whole = engines.run_native(plane, network, at)
+    reference = engines.run_numpy(plane, network, at)
+    assert np.abs(whole - reference).max() < 2e-4 * np.abs(reference).max()
+    for some in (slice(0, 0), slice(5, 6), slice(9, 265), slice(700, None)):
+        part = at._replace(base=at.base[some], fx=at.fx[some], fy=at.fy[some])
+        assert (engines.run_native(plane, network, part) == whole[some]).all()
 
 
 def test_taps_never_leave_the_plane():

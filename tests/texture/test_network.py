@@ -4,7 +4,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from proxyimg_codec.errors import FormatError
-from proxyimg_codec.texture.network import NetShape, Network, encode_features, pack, unpack
+from proxyimg_codec.texture.network import (
+    BLOCK,
+    LARGE_BLOCK,
+    SMALL,
+    NetShape,
+    Network,
+    encode_features,
+    pack,
+    unpack,
+)
 
 
 def random_network(shape, bits, seed=0):
@@ -43,13 +52,15 @@ def test_paper_arithmetic():
     assert NetShape(8, 6, 32, 2, 3).parameters + 83 * 83 * 8 == 59627
 
 
-def test_encoding_is_the_sines_and_cosines():
-    f = np.random.default_rng(0).normal(0, 1.2, (500, 3)).astype(np.float32)
+@pytest.mark.parametrize("scale", [1.2, 3000])
+def test_encoding_is_the_sines_and_cosines(scale):
+    f = np.random.default_rng(0).normal(0, scale, (500, 3)).astype(np.float32)
     out = encode_features(f, 6)
     exact = [f.astype(np.float64)]
     for k in range(6):
         exact += [np.sin(2**k * np.pi * exact[0]), np.cos(2**k * np.pi * exact[0])]
     assert out.shape == (500, 39)
+    assert (out[:, :3] == f).all()
     assert np.abs(out - np.concatenate(exact, 1)).max() < 2e-5
 
 
@@ -65,6 +76,25 @@ def test_output_is_the_plain_mlp():
         x = x @ (w * s[:, None]).T + b
         x = np.maximum(x, 0) if k < 2 else x
     assert np.allclose(network(f), x, atol=1e-5)
+
+
+@pytest.mark.parametrize("hidden", [13, 97])
+def test_points_do_not_depend_on_each_other(hidden):
+    """Bit for bit, whether the layers count as small or as large."""
+    shape = NetShape(5, 4, hidden, 2, 3)
+    network = random_network(shape, 8)
+    assert max(i * o for i, o in shape.layers) * BLOCK > SMALL or hidden == 13
+    for weight, _ in network.layers:
+        point = np.random.default_rng(3).normal(0, 1, (weight.shape[1], 1)).astype(np.float32)
+        for block in (BLOCK, LARGE_BLOCK):
+            same = weight @ point.repeat(block, 1)
+            if (same != same[:, :1]).any():
+                pytest.skip("BLAS rounds by place within a product")
+    f = np.random.default_rng(2).normal(0, 1, (5000, 5)).astype(np.float32)
+    whole = network(f)
+    assert whole.shape == (5000, 3)
+    for part in (slice(0, 0), slice(3, 4), slice(70, 330), slice(1000, None), slice(None, None, 7)):
+        assert (network(f[part]) == whole[part]).all()
 
 
 @pytest.mark.parametrize(
