@@ -1,11 +1,10 @@
-"""Parts of hand-made pictures: reproducible numbers, networks, textures, paths; and their list."""
+"""Parts of hand-made pictures: reproducible numbers, networks, textures, paths, meshes."""
 
 from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,8 @@ from numpy.typing import NDArray
 
 from proxyimg_codec.container.chunks import Chunk
 from proxyimg_codec.geometry.boundary import Boundary
+from proxyimg_codec.geometry.mesh import Base, Mesh
+from proxyimg_codec.geometry.pose import REST, Pose
 from proxyimg_codec.image import Image, Layer, Layers
 from proxyimg_codec.texture.implicit import Box, ImplicitTexture
 from proxyimg_codec.texture.network import NetShape, Network
@@ -119,9 +120,60 @@ def _snapped(points: Sequence[Point], unit: int, reverse: bool) -> Path:
     return np.roll(path[::-1], 1, axis=0) if reverse else path
 
 
-def layer(name: str, box: Box, texture: ImplicitTexture, *paths: Path, unit: int = 4) -> Layer:
+def grid_mesh(
+    origin: tuple[int, int],
+    columns: int,
+    rows: int,
+    *,
+    step: tuple[int, int] = (256, 256),
+    cell: int = 16,
+    keep: Sequence[int] | None = None,
+    split: Sequence[Sequence[int]] = (),
+) -> Mesh:
+    """A mesh of square cells of two triangles each, of 4 pixels by default.
+
+    Args:
+        origin: Canvas pixel of its corner.
+        columns: Cells across.
+        rows: Cells down.
+        step: Lattice spacing in 1/1024 pixel.
+        cell: Lattice units of a cell.
+        keep: The triangles it has, two a cell in raster order; all by default.
+        split: Numbers of the triangles that each refinement splits.
+    """
+    triangles = []
+    for k in range(columns * rows):
+        a = k // columns * (columns + 1) + k % columns
+        triangles += [(a, a + 1, a + columns + 1), (a + 1, a + columns + 2, a + columns + 1)]
+    chosen = np.array(triangles)[slice(None) if keep is None else list(keep)]
+    used, corners = np.unique(chosen, return_inverse=True)
+    points = np.stack([used % (columns + 1), used // (columns + 1)], axis=1) * cell
+    base = Base(origin, step, points.astype(np.uint8), corners.reshape(-1, 3).astype(np.int32))
+    flags, count = [], len(chosen)
+    for numbers in split:
+        flags.append(np.isin(np.arange(count), numbers))
+        count = 4 * len(numbers)
+    return Mesh.build(base).split(flags)
+
+
+def bend(numbers: Numbers, mesh: Mesh, reach: int = 24) -> NDArray[np.int64]:
+    """Random displacements [N, 2] of all nodes in -reach..reach, in 1/16 pixel."""
+    return numbers.integers(-reach, reach, mesh.refined.nodes.shape)
+
+
+def layer(
+    name: str,
+    box: Box,
+    texture: ImplicitTexture,
+    *paths: Path,
+    unit: int = 4,
+    mesh: Mesh | None = None,
+    pose: Pose = REST,
+    sampling: int = 0,
+) -> Layer:
     """A layer; without paths it covers the whole canvas."""
-    return Layer(name, box, Boundary(unit, paths) if paths else None, texture)
+    boundary = Boundary(unit, paths) if paths else None
+    return Layer(name, box, boundary, texture, mesh, sampling, pose)
 
 
 def picture(
@@ -132,9 +184,8 @@ def picture(
     extra: Sequence[Chunk] = (),
 ) -> Image:
     """An image of `layers`, back to front."""
-    return Image(
-        *size, networks[0].shape.channels, opaque, 8, Layers(layers), networks, extra=tuple(extra)
-    )
+    channels = max(net.shape.channels for net in networks)
+    return Image(*size, channels, opaque, 8, Layers(layers), networks, extra=tuple(extra))
 
 
 def layered(n: Numbers, channels: int = 3) -> Image:
@@ -154,39 +205,19 @@ def layered(n: Numbers, channels: int = 3) -> Image:
     )
 
 
-Args = Mapping[str, Any]
-Build = Callable[[Numbers], Image | bytes]
-WHOLE: Args = {}
-"""Arguments of the plainest render."""
+SIZE = 24, 18
+"""Canvas of `disc_on_back`."""
 
 
-@dataclass(frozen=True)
-class Valid:
-    """A valid case.
-
-    Attributes:
-        title: One sentence.
-        tests: What it is there for.
-        build: Makes the picture, or its file where the package would not write it so.
-        renders: Arguments of each render.
-    """
-
-    title: str
-    tests: tuple[str, ...]
-    build: Build
-    renders: Sequence[Args]
+def disc(n: Numbers, mesh: Mesh | None = None, **pose: Any) -> Layer:
+    """A disc over a plane of fine detail, posed."""
+    plane = texture(n, grid=(9, 8))
+    shape = ellipse((12, 9), (7, 5.5))
+    return layer("disc", (4, 3, 16, 12), plane, shape, mesh=mesh, pose=Pose(**pose))
 
 
-class Valids(dict[str, Valid]):
-    """Valid cases by name."""
-
-    def case(
-        self, title: str, *tests: str, renders: Sequence[Args] = (WHOLE,)
-    ) -> Callable[[Build], None]:
-        """Decorates a builder, whose name, with dashes, becomes that of the case."""
-
-        def register(build: Build) -> None:
-            name = getattr(build, "__name__", "").strip("_").replace("_", "-")
-            self[name] = Valid(title, tests, build, renders)
-
-        return register
+def on_back(n: Numbers, *layers: Layer, channels: int = 3) -> Image:
+    """A picture of `SIZE` with a back layer behind `layers`, and one network."""
+    back = layer("back", (0, 0, *SIZE), texture(n))
+    net = network(n, channels=channels, contrast=0.6 if channels == 3 else 1.5)
+    return picture(SIZE, [back, *layers], net, opaque=channels == 3)

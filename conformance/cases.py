@@ -20,12 +20,14 @@ class Render:
     """One picture that a decoder must be able to make of a case's input.
 
     Attributes:
-        flags: Command-line flags that ask for it.
+        args: Arguments of `Image.render` that ask for it.
+        flags: Command-line flags that do.
         expected: PNG file of the pixels.
         peak: Largest error of a sample that is allowed, in 8-bit levels.
         rms: Largest root mean square error, likewise.
     """
 
+    args: Mapping[str, Any]
     flags: tuple[str, ...]
     expected: Path
     peak: float
@@ -62,7 +64,13 @@ def load(folder: Path = FOLDER, pattern: str = "*") -> list[Case]:
 def _read(file: Path) -> Case:
     values = json.loads(file.read_text(encoding="utf-8"))
     renders = [
-        Render(flags(r["args"]), file.parent / r["expected"], float(r["peak"]), float(r["rms"]))
+        Render(
+            r["args"],
+            flags(r["args"]),
+            file.parent / r["expected"],
+            float(r["peak"]),
+            float(r["rms"]),
+        )
         for r in values.get("renders", [])
     ]
     error = values.get("error")

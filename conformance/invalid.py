@@ -12,6 +12,7 @@ import numpy as np
 
 from proxyimg_codec.container.chunks import Chunk, read, write
 from proxyimg_codec.entropy import arrays
+from proxyimg_codec.image import Image
 
 from .builders import Numbers, ellipse, layer, network, picture, texture
 
@@ -26,13 +27,16 @@ class Base:
     """A valid file: a back and a disc with a mask, 5-bit codes, one network."""
 
     def __init__(self) -> None:
-        n = Numbers("base")
-        self.stored = n.integers(0, 2, GRID[::-1]) > 0
-        back = layer("back", (0, 0, 12, 10), texture(n, grid=GRID, bits=5))
-        plane = texture(n, grid=GRID, bits=5, stored=self.stored)
-        disc = layer("disc", (2, 2, 8, 7), plane, ellipse((6, 5.5), (4, 3.5)))
-        self.data = picture((12, 10), [back, disc], network(n)).to_bytes()
+        self.data = self.build(Numbers("base")).to_bytes()
         self.chunks = read(self.data)
+
+    def build(self, n: Numbers) -> Image:
+        """The picture."""
+        stored = n.integers(0, 2, GRID[::-1]) > 0
+        back = layer("back", (0, 0, 12, 10), texture(n, grid=GRID, bits=5))
+        plane = texture(n, grid=GRID, bits=5, stored=stored)
+        disc = layer("disc", (2, 2, 8, 7), plane, ellipse((6, 5.5), (4, 3.5)))
+        return picture((12, 10), [back, disc], network(n))
 
     def fields(self, at: int) -> dict[str, Any]:
         """The map of chunk number `at`."""
@@ -102,11 +106,12 @@ def _deep(b: Base) -> bytes:
 
 @dataclass(frozen=True)
 class Invalid:
-    """A case to be refused: its title, what it is there for, and what is done to the base file."""
+    """A case to be refused: title, what it is there for, what is done to which base file."""
 
     title: str
     tests: tuple[str, ...]
-    build: Callable[[Base], bytes]
+    build: Callable[[Any], bytes]
+    base: type[Base] = Base
 
 
 _Row = tuple[str, str, str, Callable[[Base], bytes]]
@@ -144,7 +149,11 @@ _FRAMING: list[_Row] = [
      lambda b: b.insert(NETW, "tesT")),
     ("invalid-type-digit", "a chunk type with a digit", "chunk: type",
      lambda b: b.insert(NETW, "t3ST")),
-    ("unsupported-version", "format 1.0", "file: version", lambda b: put(b.data, 8, lambda v: 1)),
+    ("unsupported-version", "format 1.2", "file: version", lambda b: put(b.data, 8, lambda v: 1)),
+    ("unsupported-version-0-3", "format 0.3", "file: version",
+     lambda b: put(b.data, 9, lambda v: 3)),
+    ("unsupported-version-0-0", "format 0.0", "file: version",
+     lambda b: put(b.data, 9, lambda v: 0)),
     ("unsupported-chunk", "an unknown critical chunk", "chunk: critical",
      lambda b: b.insert(NETW, "TeST")),
 ]
@@ -168,10 +177,6 @@ _STRUCTURE: list[_Row] = [
     ("invalid-names", "two layers of one name", "names", lambda b: b.set(DISC, name="back")),
     ("invalid-network-index", "a network that does not exist", "references",
      lambda b: b.set(DISC_TEXR, network=1)),
-    ("invalid-channels", "the network has not HEAD's channels", "channels",
-     lambda b: b.set(HEAD, channels=4, opaque=0)),
-    ("invalid-opaque-channels", "opaque with four channels", "opaque",
-     lambda b: b.set(HEAD, channels=4)),
     ("invalid-opaque-boundary", "opaque with a boundary on the back layer", "opaque",
      lambda b: b.order(HEAD, DISC, BACK, NETW, DISC_TEXR, BACK_TEXR, TAIL)),
     ("invalid-depth", "a depth of 12 bits", "range", lambda b: b.set(HEAD, depth=12)),

@@ -7,6 +7,7 @@ plain numpy decoder, whose last bits may differ from machine to machine, and are
 from __future__ import annotations
 
 import argparse
+import functools
 import json
 import os
 import shutil
@@ -22,18 +23,22 @@ from proxyimg_codec import errors, kernel
 from proxyimg_codec.image import from_bytes
 from proxyimg_codec.pictures import encode_png
 
-from . import invalid, valid, views
+from . import bent, invalid, invalid_posed, nodes, posed, valid, views
 from .builders import Numbers
 from .cases import EXIT_CODES, FOLDER
+
+VALID = {**valid.CASES, **views.CASES, **bent.CASES, **posed.CASES, **nodes.CASES}
+INVALID = {**invalid.CASES, **invalid_posed.CASES}
 
 PEAK, RMS = 0.05, 0.01
 """Errors in 8-bit levels that are allowed: ten times what float32 sums in another order cost."""
 
 
+@functools.cache
 def build() -> dict[str, tuple[bytes, dict[str, Any]]]:
     """Input and description of every case, by name."""
     out: dict[str, tuple[bytes, dict[str, Any]]] = {}
-    for name, case in {**valid.CASES, **views.CASES}.items():
+    for name, case in VALID.items():
         numbers = Numbers(name)
         made = case.build(numbers)
         renders = [
@@ -47,11 +52,11 @@ def build() -> dict[str, tuple[bytes, dict[str, Any]]]:
             "renders": renders,
         }
         out[name] = made if isinstance(made, bytes) else made.to_bytes(), description
-    base = invalid.Base()
-    for name, bad in invalid.CASES.items():
+    bases = {bad.base: bad.base() for bad in INVALID.values()}
+    for name, bad in INVALID.items():
         error = name.split("-")[0]
         out[name] = (
-            bad.build(base),
+            bad.build(bases[bad.base]),
             {
                 "title": bad.title,
                 "tests": list(bad.tests),

@@ -12,11 +12,7 @@ from proxyimg_codec.container.meta import BLOCKS, FIELDS
 from proxyimg_codec.image import Image
 
 from .builders import (
-    WHOLE,
-    Build,
     Numbers,
-    Valid,
-    Valids,
     ellipse,
     layer,
     layered,
@@ -25,6 +21,7 @@ from .builders import (
     polygon,
     texture,
 )  # fmt: skip
+from .registry import WHOLE, Build, Valid, Valids
 
 CASES = Valids()
 _case = CASES.case

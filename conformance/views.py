@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from proxyimg_codec.image import Image
 
-from .builders import WHOLE, Numbers, Valids, ellipse, layer, layered, network, picture, texture
+from .builders import Numbers, ellipse, layer, layered, network, picture, texture
+from .registry import WHOLE, Valids
 
 CASES = Valids()
 _case = CASES.case

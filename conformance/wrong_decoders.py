@@ -23,24 +23,12 @@ from proxyimg_codec.cli import decode
 from proxyimg_codec.container import chunks, fields, file
 from proxyimg_codec.entropy import arrays, rans
 from proxyimg_codec.errors import FormatError
-from proxyimg_codec.geometry import boundary, coverage
+from proxyimg_codec.geometry import coverage, deltas
 from proxyimg_codec.render import compose, view
 from proxyimg_codec.texture import diffusion, implicit, network
 
-Patch = tuple[object, str, Any]
-"""Object, attribute and what stands there instead."""
-
-
-class _Anything:
-    """Equal to whatever it is compared with."""
-
-    __hash__ = None  # type: ignore[assignment]  # as Python does where __eq__ is defined
-
-    def __eq__(self, other: object) -> bool:
-        return True
-
-    def __ne__(self, other: object) -> bool:
-        return False
+from .wrong_poses import FAULTS as FAULTS_OF_POSES
+from .wrong_poses import Anything, Patch
 
 
 def _ignoring_holes(paths: Any, *window: int) -> Any:
@@ -131,7 +119,7 @@ FAULTS: dict[str, list[Patch]] = {
     "coarse-coverage": _coverage(lambda *a: coverage_of(*a) // 8192 * 8192),
     "points-floored": [(coverage, "to_output", _floored)],
     "coarse-curves": [(coverage, "MAX_LOG2_CHORDS", 1)],
-    "escape-narrow": [(boundary, "_ESCAPE", 16)],
+    "escape-narrow": [(deltas, "_ESCAPE", 16)],
     "swaps-channels": [(compose, "premultiplied", lambda out:
         premultiplied_of(out)[:, [2, 1, 0, 3]])],
     "not-premultiplied": [(image, "_finish", _straight)],
@@ -155,13 +143,14 @@ FAULTS: dict[str, list[Patch]] = {
         write_of(path, (p >> 8).astype(np.uint8), *a))],
     "writes-nothing": [(pictures, "write", lambda *a: None)],
     "writes-rubbish": [(pictures, "write", lambda path, *a: Path(path).write_bytes(b"rubbish"))],
-    "accepts-bad-crc": [(chunks, "zlib", types.SimpleNamespace(crc32=lambda data: _Anything()))],
+    "accepts-bad-crc": [(chunks, "zlib", types.SimpleNamespace(crc32=lambda data: Anything()))],
     "accepts-trailing-bytes": [(file, "read", _no_trailing)],
     "ignores-critical-chunks": [(chunks.Chunk, "critical", False)],
     "accepts-left-over-words": [(rans.Decoder, "finish", lambda self: None)],
     "accepts-any-step": [(implicit, "read_halves", _lenient_halves),
         (network, "read_halves", _lenient_halves)],
     "accepts-any-encoding": [(file, "unpack", _lenient_fields)],
+    **FAULTS_OF_POSES,
     "exit-code-1": [(decode, "main", _crashing)],
     "exit-code-0": [(decode, "main", _obliging)],
     "hangs": [(decode, "main", _hanging)],

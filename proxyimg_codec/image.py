@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
@@ -12,13 +13,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .container import file as container
-from .container.chunks import Chunk
+from .container import texr
+from .container.check import check
+from .container.chunks import Chunk, write
+from .container.fields import pack
+from .container.undo import Step
+from .editable import Editable
 from .errors import PxiError, UsageError
 from .files import read_bytes, write_atomically
 from .geometry import boundary as boundaries
+from .geometry import pose as posing
+from .geometry import warp
 from .geometry.boundary import Boundary
+from .geometry.mesh import Mesh
+from .geometry.pose import REST, Pose
 from .limits import DEFAULT_LIMITS, Limits
-from .render import engines
+from .render.cache import Cache
 from .render.compose import render
 from .render.view import make_view
 from .texture import implicit, network
@@ -27,20 +37,37 @@ from .texture.network import Network
 
 
 @dataclass(frozen=True, eq=False)
-class Layer:
-    """One layer.
+class Layer(Editable):
+    """One layer. Its methods edit: each returns a new image.
 
     Attributes:
         name: Unique in the image.
         box: x, y, width, height of the texture's rectangle in canvas pixels.
-        boundary: Closed paths, or None for the whole canvas.
+        boundary: Closed paths at rest, or None for the whole canvas.
         texture: Codes and the index of their network.
+        mesh: Proxy nodes, or None.
+        sampling: How features are found: 0 direct, 1 to 3 at the proxy nodes.
+        pose: What edits have done to it.
+        parent: Name of the layer or group that it follows, or None.
+        image: The image it belongs to.
     """
 
     name: str
     box: Box
     boundary: Boundary | None
     texture: ImplicitTexture
+    mesh: Mesh | None = None
+    sampling: int = 0
+    pose: Pose = REST
+    parent: str | None = None
+    image: Image | None = field(default=None, repr=False)
+
+    @cached_property
+    def outline(self) -> Boundary | None:
+        """The boundary in its present place; None for the whole canvas."""
+        assert self.image is not None, "a layer of no image has no canvas"
+        size = (self.image.width, self.image.height)
+        return warp.outline(self.boundary, self.pose, self.mesh, size)
 
 
 class Layers(Sequence[Layer]):
@@ -88,6 +115,9 @@ class Image:
         blocks: Metadata blocks ``icc``, ``exif``, ``xmp``.
         info: Encoder, settings and areas, as in the iNFO chunk, or None.
         extra: Unknown ancillary chunks, carried along.
+        groups: Parent of each group of layers, a name or None, by the group's name.
+        history: The edits that led here, oldest first, each with the state before it.
+        cache: Colours that were computed, shared with the images made from this one.
     """
 
     width: int
@@ -100,14 +130,50 @@ class Image:
     blocks: Mapping[str, bytes] = field(default_factory=dict)
     info: Mapping[str, Any] | None = None
     extra: tuple[Chunk, ...] = ()
+    groups: Mapping[str, str | None] = field(default_factory=dict)
+    history: tuple[Step, ...] = ()
+    cache: Cache = field(default_factory=Cache, repr=False)
 
     def __post_init__(self) -> None:
+        bound = Layers(replace(layer, image=self) for layer in self.layers)
+        object.__setattr__(self, "layers", bound)
         object.__setattr__(self, "blocks", MappingProxyType(dict(self.blocks)))
+        object.__setattr__(self, "groups", MappingProxyType(dict(self.groups)))
         if self.info is not None:
             object.__setattr__(self, "info", MappingProxyType(dict(self.info)))
         for layer in self.layers:
             layer.texture.codes.flags.writeable = False
             layer.texture.stored.flags.writeable = False
+
+    def edited(self, *operations: Mapping[str, Any]) -> Image:
+        """The picture after `operations`, in order; each can be undone.
+
+        Args:
+            operations: As in an edit script, such as
+                ``{"op": "move", "layer": "cat", "by": [40, -10]}``.
+
+        Raises:
+            UsageError: An operation is unknown, or cannot be done.
+        """
+        from .edit.script import apply
+
+        return apply(self, operations)
+
+    def undone(self, steps: int = 1) -> Image:
+        """The picture before its last `steps` edits.
+
+        Raises:
+            UsageError: There are not as many.
+        """
+        if not 1 <= steps <= len(self.history):
+            raise UsageError(f"cannot undo {steps} edits: the picture has {len(self.history)}")
+        past = self.history[len(self.history) - steps]
+        image = from_bytes(write([*past.chunks, Chunk("TAIL", b"")]))
+        return replace(image, history=self.history[: len(self.history) - steps])
+
+    def baked(self) -> Image:
+        """The same picture without its history."""
+        return replace(self, history=())
 
     def render(
         self,
@@ -130,7 +196,7 @@ class Image:
             height: Output rows.
             scale: Output pixels a canvas pixel, instead of width and height.
             region: x, y, width, height in canvas pixels.
-            layers: Names or positions of the layers to draw; all by default.
+            layers: Names or positions of the layers to draw; all that are not hidden by default.
             background: Whether to draw the back layer of an opaque picture.
             dtype: uint8 or uint16 (rounded), or float32 in 0..1.
             engine: ``auto``, ``numpy``, ``native`` or ``ort``.
@@ -164,17 +230,20 @@ class Image:
             if progress:
                 progress(h * w)
 
-        render(self, view, chosen, engines.find(engine), put)
+        render(self, view, chosen, engine, put, limits)
         return result
 
     def _select(self, layers: Sequence[str | int] | None, background: bool) -> list[Layer]:
-        wanted = list(self.layers) if layers is None else [self.layers[k] for k in layers]
+        if layers is None:
+            wanted = [layer for layer in self.layers if not layer.pose.hidden]
+        else:
+            wanted = [self.layers[k] for k in layers]
         chosen = [
             layer
             for i, layer in enumerate(self.layers)
             if any(layer is w for w in wanted) and (background or i > 0 or not self.opaque)
         ]
-        if not chosen:
+        if not chosen and (layers is not None or not background):
             raise UsageError("no layer is left to draw")
         return chosen
 
@@ -184,7 +253,19 @@ class Image:
         Raises:
             LimitError: It is larger than readers accept by default.
         """
-        file = container.Container(
+        content = self._container()
+        check(content, DEFAULT_LIMITS)
+        return container.serialize(content)
+
+    @cached_property
+    def chunks(self) -> tuple[Chunk, ...]:
+        """The chunks of its file but uNDO and TAIL."""
+        return tuple(container.present(self._container()))
+
+    def _container(self) -> container.Container:
+        meshes = [(i, v.mesh) for i, v in enumerate(self.layers) if v.mesh is not None]
+        poses = [(i, v) for i, v in enumerate(self.layers) if not v.pose.at_rest]
+        return container.Container(
             {
                 "size": [self.width, self.height],
                 "channels": self.channels,
@@ -194,17 +275,44 @@ class Image:
                 "networks": len(self.networks),
             },
             tuple(
-                {"name": v.name, "box": list(v.box), "sampling": 0, **boundaries.encode(v.boundary)}
+                {
+                    "name": v.name,
+                    "box": list(v.box),
+                    "sampling": v.sampling,
+                    **boundaries.encode(v.boundary),
+                }
                 for v in self.layers
             ),
-            tuple(network.pack(n) for n in self.networks),
-            tuple(implicit.pack(v.texture) for v in self.layers),
+            tuple(n.packed for n in self.networks),
+            self._textures(),
+            tuple({"layer": i, **m.fields} for i, m in meshes),
+            tuple({"layer": i, **posing.encode(v.pose, v.mesh)} for i, v in poses),
+            self._tree(),
+            self.history,
             self.blocks,
             self.info,
             self.extra,
         )
-        container.check(file, DEFAULT_LIMITS)
-        return container.serialize(file)
+
+    def _textures(self) -> tuple[Mapping[str, Any], ...]:
+        """Fields of each TEXR; what is equal to an earlier one refers to it."""
+        first: dict[bytes, int] = {}
+        out: list[Mapping[str, Any]] = []
+        for i, layer in enumerate(self.layers):
+            fields = layer.texture.packed
+            at = first.setdefault(pack(texr.FIELDS, fields), i)
+            out.append(fields if at == i else {"coder": texr.SHARED, "texture": at})
+        return tuple(out)
+
+    def _tree(self) -> dict[str, Any] | None:
+        above = [layer.parent for layer in self.layers] + list(self.groups.values())
+        if not self.groups and not any(above):
+            return None
+        number = {n: i + 1 for i, n in enumerate([*(v.name for v in self.layers), *self.groups])}
+        return {
+            "groups": list(self.groups),
+            "parents": [0 if name is None else number[name] for name in above],
+        }
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the picture to `path`, replacing it in one step.
@@ -217,15 +325,13 @@ class Image:
 
 def _finish(tile: NDArray[np.float32], solid: bool, dtype: np.dtype[Any]) -> NDArray[Any]:
     """Premultiplied [h, w, 4] -> straight alpha or opaque output samples."""
-    if solid:
-        tile = tile[..., :3]
-    else:
+    if not solid:
         tile = tile.copy()
         tile[..., :3] /= np.maximum(tile[..., 3:], np.float32(1e-6))
     tile = np.clip(tile, 0, 1)
-    if dtype == np.float32:
-        return tile
-    return np.rint(tile * np.iinfo(dtype).max).astype(dtype)
+    if dtype != np.float32:
+        tile = np.rint(tile * np.iinfo(dtype).max).astype(dtype)
+    return tile[..., :3] if solid else tile
 
 
 def from_bytes(data: bytes, limits: Limits = DEFAULT_LIMITS) -> Image:
@@ -238,19 +344,43 @@ def from_bytes(data: bytes, limits: Limits = DEFAULT_LIMITS) -> Image:
     """
     c = container.parse(data, limits)
     networks = tuple(network.unpack(v, f"chunk NETW {i}") for i, v in enumerate(c.networks))
+    meshes = {
+        v["layer"]: Mesh({k: w for k, w in v.items() if k != "layer"}, f"chunk MESH {i}", limits)
+        for i, v in enumerate(c.meshes)
+    }
+    poses = {
+        v["layer"]: posing.decode(v, meshes.get(v["layer"]), f"chunk POSE {i}")
+        for i, v in enumerate(c.poses)
+    }
+    groups = c.tree["groups"] if c.tree else []
+    nodes = [None, *(v["name"] for v in c.layers), *groups]
+    parents = [nodes[k] for k in c.tree["parents"]] if c.tree else [None] * len(c.layers)
+    textures: list[ImplicitTexture] = []
+    for i, (v, t) in enumerate(zip(c.layers, c.textures, strict=True)):
+        if t["coder"] == texr.SHARED:
+            textures.append(textures[t["texture"]])
+        else:
+            textures.append(implicit.unpack(t, networks, f"chunk TEXR {i}", v["sampling"]))
     layers = [
         Layer(
             v["name"],
             (v["box"][0], v["box"][1], v["box"][2], v["box"][3]),
             boundaries.decode(v, f"chunk LAYR {i}"),
-            implicit.unpack(t, networks, f"chunk TEXR {i}"),
+            texture,
+            meshes.get(i),
+            v["sampling"],
+            poses.get(i, REST),
+            parent,
         )
-        for i, (v, t) in enumerate(zip(c.layers, c.textures, strict=True))
+        for i, (v, texture, parent) in enumerate(
+            zip(c.layers, textures, parents[: len(c.layers)], strict=True)
+        )
     ]
     width, height = c.head["size"]
     return Image(
         width, height, c.head["channels"], bool(c.head["opaque"]), c.head["depth"],
         Layers(layers), networks, c.blocks, c.info, c.extra,
+        dict(zip(groups, parents[len(c.layers) :], strict=True)), c.history,
     )  # fmt: skip
 
 

@@ -18,6 +18,11 @@ class Limits:
         layers: Layers in a file.
         networks: Decoder networks in a file.
         segments: Bézier segments in all boundaries together.
+        gates: Gates of all meshes together: steps of decoding their connectivity.
+        faces: Triangles of one refined mesh.
+        overlap: How often, in the mean, the triangles of a deformed layer may cover a sample.
+        beyond: Pairs of a point that no face of a mesh holds and a face, which are compared to
+            find the nearest.
         codes: Scalar codes in all textures together, stored or not.
         wavefronts: Columns plus twice the rows of a plane of codes: steps of its decoding.
         parameters: Parameters of all networks together.
@@ -31,6 +36,10 @@ class Limits:
     layers: int = 1024
     networks: int = 64
     segments: int = 1 << 16
+    gates: int = 1 << 16
+    faces: int = 1 << 18
+    overlap: int = 64
+    beyond: int = 1 << 28
     codes: int = 1 << 25
     wavefronts: int = 1 << 16
     parameters: int = 1 << 22

@@ -55,7 +55,11 @@ def read(path: str | os.PathLike[str]) -> Picture:
         UnsupportedError: OpenImageIO is not installed.
     """
     name = "standard input" if os.fspath(path) == "-" else os.fspath(path)
-    data = read_bytes(path)
+    return parse(read_bytes(path), name)
+
+
+def parse(data: bytes, name: str) -> Picture:
+    """As `read`, of a picture file in memory called `name` in messages; its suffix is a hint."""
     if not data:
         raise InputError(f"{name}: the file is empty")
     if data[:6] == b"\x93NUMPY":

@@ -11,12 +11,16 @@ from pathlib import Path
 import msgpack
 import numpy as np
 
-from proxyimg_codec.container import chunks, meta
+from proxyimg_codec.container import chunks, meta, tree, undo
 from proxyimg_codec.errors import PxiError
 from proxyimg_codec.files import read_bytes
 from proxyimg_codec.geometry import coverage as cover
+from proxyimg_codec.geometry.boundary import Boundary
+from proxyimg_codec.geometry.mesh import Refined
+from proxyimg_codec.geometry.pose import Pose
 from proxyimg_codec.image import Image, from_bytes
 from proxyimg_codec.texture.diffusion import fill
+from proxyimg_codec.texture.implicit import ImplicitTexture
 
 Piece = tuple[int, str]
 """A number of bytes and what they mean."""
@@ -27,7 +31,10 @@ LINE = 16
 LINES = 16
 """Lines of one piece that are shown; the rest is counted."""
 
-MAPS = ("HEAD", "LAYR", "NETW", "TEXR", meta.INFO_TYPE, *meta.BLOCKS.values())
+MAPS = (
+    *("HEAD", "LAYR", "MESH", "POSE", "NETW", "TEXR"),
+    *(*meta.BLOCKS.values(), meta.INFO_TYPE, tree.TYPE, undo.TYPE),
+)
 
 
 def coded_array(data: bytes) -> Iterator[Piece]:
@@ -69,11 +76,18 @@ def blob(meaning: str) -> Callable[[bytes], Iterator[Piece]]:
 BINARY: dict[str, Callable[[bytes], Iterator[Piece]]] = {
     "classes": coded_array,
     "deltas": blob("raw bits"),
+    "symbols": coded_array,
+    "splits": arrays,
+    "node_classes": coded_array,
+    "node_deltas": blob("raw bits"),
+    "place_classes": coded_array,
+    "place_deltas": blob("raw bits"),
     "steps": halves,
     "biases": halves,
     "weights": arrays,
     "stored": coded_array,
     "codes": coded_array,
+    "state": blob("SHA-256"),
     "zstd": blob("Zstandard frame"),
 }
 """What is inside the binary fields."""
@@ -146,34 +160,77 @@ def grid(values: np.ndarray, shown: np.ndarray | None = None) -> Iterator[str]:
         yield "  " + " ".join(cell.rjust(width) for cell in row)
 
 
+def points(pairs: np.ndarray, a_line: int = 8) -> Iterator[str]:
+    """Lines of tuples of integers [N, k]."""
+    for at in range(0, len(pairs), a_line):
+        yield "  " + " ".join(str(tuple(p)) for p in pairs[at : at + a_line].tolist())
+
+
+def mesh_values(name: str, refined: Refined) -> Iterator[str]:
+    """Lines of nodes and faces."""
+    yield f"layer {name!r}, {len(refined.nodes)} nodes in 1/1024 pixel"
+    yield from points(refined.nodes)
+    yield f"layer {name!r}, {len(refined.faces)} faces"
+    yield from points(refined.faces)
+
+
+def pose_values(name: str, pose: Pose) -> Iterator[str]:
+    """Lines of a pose that is not at rest."""
+    yield f"layer {name!r}, pose"
+    yield f"  matrix {list(pose.matrix)} shift {list(pose.shift)}"
+    yield f"  opacity {pose.opacity} hidden {int(pose.hidden)}"
+    if pose.colour:
+        yield f"  colour {list(pose.colour)}"
+    for what, moved in (("nodes", pose.nodes), ("texture", pose.places)):
+        if moved is not None:
+            yield f"layer {name!r}, displacements of the {what} in 1/16 pixel"
+            yield from points(moved)
+
+
+def shape_values(name: str, outline: Boundary, width: int, height: int) -> Iterator[str]:
+    """Lines of the outline of a layer and its coverage of the canvas."""
+    for k, path in enumerate(outline.paths):
+        yield f"layer {name!r}, control points of path {k}"
+        yield "  " + " ".join(f"({x}, {y})" for x, y in path)
+    scaled = [
+        np.stack([cover.to_output(p[:, i], outline.unit, 0, n, n)
+                  for i, n in enumerate((width, height))], axis=1)
+        for p in outline.paths
+    ]  # fmt: skip
+    yield f"layer {name!r}, coverage of the canvas in 1/{cover.FULL}"
+    yield from grid(cover.coverage(scaled, 0, 0, width, height))
+
+
+def texture_values(name: str, texture: ImplicitTexture) -> Iterator[str]:
+    """Lines of stored and filled codes."""
+    filled = fill(texture.codes, texture.stored)
+    for f, codes in enumerate(texture.codes):
+        yield f"layer {name!r}, codes of feature {f}"
+        yield from grid(codes, texture.stored)
+        if not texture.stored.all():
+            yield f"layer {name!r}, filled codes of feature {f}"
+            yield from grid(filled[f])
+
+
 def values(image: Image) -> Iterator[str]:
     """Lines of the integers that a small file decodes to."""
     for i, network in enumerate(image.networks):
         for k, weights in enumerate(network.weights):
             yield f"network {i}, weights of linear layer {k}"
             yield from grid(weights)
+    shown: dict[ImplicitTexture, str] = {}
     for layer in image.layers:
-        if layer.boundary is not None:
-            for k, path in enumerate(layer.boundary.paths):
-                yield f"layer {layer.name!r}, control points of path {k}"
-                yield "  " + " ".join(f"({x}, {y})" for x, y in path)
-            scaled = [
-                np.stack(
-                    [cover.to_output(p[:, i], layer.boundary.unit, 0, n, n)
-                     for i, n in enumerate((image.width, image.height))], axis=1
-                )
-                for p in layer.boundary.paths
-            ]  # fmt: skip
-            yield f"layer {layer.name!r}, coverage of the canvas in 1/{cover.FULL}"
-            yield from grid(cover.coverage(scaled, 0, 0, image.width, image.height))
-        texture = layer.texture
-        filled = fill(texture.codes, texture.stored)
-        for f, codes in enumerate(texture.codes):
-            yield f"layer {layer.name!r}, codes of feature {f}"
-            yield from grid(codes, texture.stored)
-            if not texture.stored.all():
-                yield f"layer {layer.name!r}, filled codes of feature {f}"
-                yield from grid(filled[f])
+        if layer.mesh is not None:
+            yield from mesh_values(layer.name, layer.mesh.refined)
+        if not layer.pose.at_rest:
+            yield from pose_values(layer.name, layer.pose)
+        if layer.outline is not None:
+            yield from shape_values(layer.name, layer.outline, image.width, image.height)
+        if layer.texture in shown:
+            yield f"layer {layer.name!r} shows the texture of {shown[layer.texture]!r}"
+            continue
+        shown[layer.texture] = layer.name
+        yield from texture_values(layer.name, layer.texture)
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -14,9 +14,11 @@ from pathlib import Path
 
 import numpy as np
 
-from proxyimg_codec.container import head, layr, meta, netw, texr
+from proxyimg_codec.container import head, layr, mesh, meta, netw, pose, texr, tree, undo
 from proxyimg_codec.container.fields import Field
 from proxyimg_codec.entropy import arrays
+from proxyimg_codec.geometry import deltas
+from proxyimg_codec.geometry import mesh as meshes
 from proxyimg_codec.image import from_bytes
 
 from .dump import dump, values
@@ -27,16 +29,30 @@ EXAMPLE = FOLDER / "example.pxi"
 FIELDS = {
     "HEAD": head.FIELDS,
     "LAYR": layr.FIELDS,
+    "MESH": mesh.FIELDS,
+    "POSE": pose.FIELDS,
     "NETW": netw.FIELDS,
     "TEXR": texr.FIELDS,
+    "TEXR shared": texr.SHARED_FIELDS,
     "BLOCK": meta.FIELDS,
     "iNFO": meta.INFO_FIELDS,
+    "tREE": tree.FIELDS,
+    "uNDO": undo.FIELDS,
 }
 
 SMALL = np.array([[[20, 21, 22, 0], [20, 21, 20, 23]]])
 SMALL_STORED = np.array([[True, True, True, False], [True, True, True, True]])
 SMALL_BITS = 5
 """The worked example of the entropy coder."""
+
+MESH = meshes.Mesh.build(
+    meshes.Base(
+        (2, 1), (1024, 1024),
+        np.array([(0, 0), (24, 0), (24, 16), (0, 16), (10, 8)], np.uint8),
+        np.array([(0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)], np.int32),
+    )
+).split([np.array([True, False, False, False])])  # fmt: skip
+"""The worked example of a mesh."""
 
 
 def number(value: int) -> str:
@@ -54,8 +70,13 @@ def fields_table(fields: tuple[Field, ...]) -> Iterator[str]:
     yield "| Key | Type | Range | Meaning |"
     yield "|---|---|---|---|"
     for f in fields:
-        several = f"array of {f.items or 'any number of'} integers"
-        kind = {"int": "integer", "str": "string", "bin": "bytes", "ints": several}[f.kind]
+        kind = {
+            "int": "integer",
+            "str": "string",
+            "bin": "bytes",
+            "ints": f"array of {f.items or 'any number of'} integers",
+            "strs": "array of any number of strings",
+        }[f.kind]
         yield f"| `{f.key}` | {kind} | {number(f.low)} .. {number(f.high)} | {f.meaning} |"
 
 
@@ -65,6 +86,56 @@ def small_example() -> Iterator[str]:
         cells = (str(v) if k else "." for v, k in zip(row, kept, strict=True))
         yield f"{name}  " + " ".join(c.rjust(2) for c in cells)
     yield "bytes   " + arrays.encode(SMALL, SMALL_BITS, SMALL_STORED).hex(" ")
+
+
+def plain(row: object) -> str:
+    """A row of integers as (1, 2)."""
+    return str(tuple(np.asarray(row).tolist()))
+
+
+def mesh_example() -> Iterator[str]:
+    """Lines of the worked example of a mesh."""
+    fields, base, refined = MESH.fields, MESH.base, MESH.refined
+    residuals = deltas.decode(fields["classes"], fields["deltas"], 2, fields["vertices"], "")
+    yield "origin     " + plain(fields["origin"]) + "  step " + plain(fields["step"])
+    for key in ("symbols", "classes", "deltas", "splits"):
+        yield f"{key:10} {fields[key].hex(' ')}"
+    yield "symbols    " + " ".join(map(str, mesh_symbols()))
+    yield "residuals  " + " ".join(map(plain, residuals.T))
+    yield "vertices   " + " ".join(map(plain, base.vertices))
+    yield "triangles  " + " ".join(map(plain, base.triangles))
+    yield "split      " + " ".join(str(int(v)) for v in MESH.splits[0])
+    yield "midpoints  " + " ".join(map(plain, refined.parents[len(base.vertices) :]))
+    yield "faces      " + " ".join(map(plain, refined.faces[:5]))
+    yield "           " + " ".join(map(plain, refined.faces[5:]))
+
+
+def mesh_symbols() -> list[int]:
+    """The symbols of the worked example of a mesh."""
+    count = MESH.fields["gates"]
+    coded = arrays.decode(MESH.fields["symbols"], (1, 1, count), 4, np.ones((1, count), bool))
+    return [int(v) for v in coded.ravel()]
+
+
+def mesh_steps() -> Iterator[str]:
+    """Rows of the table of how the gates of that mesh are decoded."""
+    yield "| Gate | Near | Expected | Ranked | Symbol | Triangle |"
+    yield "|---|---|---|---|---|---|"
+    border = meshes._Border(len(MESH.base.vertices))
+    for x, y in MESH.base.vertices:
+        border.add(int(x), int(y))
+    triangles = iter(MESH.base.triangles.tolist())
+    border.place_triangle(*next(triangles))
+    symbols = iter(mesh_symbols()[3:])
+    while (gate := border.next_gate()) is not None:
+        edge, near = gate
+        symbol, known = next(symbols), border.ranked(edge, near)
+        row = [plain(edge), str(near), plain(border.predicted(edge, near))]
+        row += [" ".join(map(str, known)) or "none", str(symbol)]
+        corners = next(triangles) if symbol else None
+        yield "| " + " | ".join([*row, plain(corners) if corners else "none"]) + " |"
+        if corners:
+            border.place_triangle(*corners)
 
 
 def pixels() -> Iterator[str]:
@@ -83,6 +154,8 @@ def fenced(lines: Iterator[str]) -> Iterator[str]:
 PARTS: dict[str, Callable[[], Iterator[str]]] = {
     **{f"fields {k}": functools.partial(fields_table, v) for k, v in FIELDS.items()},
     "example": lambda: fenced(small_example()),
+    "mesh": lambda: fenced(mesh_example()),
+    "mesh steps": mesh_steps,
     "dump": lambda: fenced(dump(EXAMPLE.read_bytes())),
     "values": lambda: fenced(values(from_bytes(EXAMPLE.read_bytes()))),
     "pixels": lambda: fenced(pixels()),
@@ -93,8 +166,12 @@ _PART = re.compile(r"^<!-- ([^\n]+) -->\n(.*?)^<!-- end -->\n", re.M | re.S)
 
 
 def chapters() -> list[Path]:
-    """The files of the specification."""
-    return sorted(FOLDER.glob("*.md"))
+    """The files of the specification: README, then the chapters by number."""
+    return [FOLDER / "README.md", *sorted(FOLDER.glob("[0-9]*.md"), key=_number)]
+
+
+def _number(chapter: Path) -> int:
+    return int(chapter.name.partition("-")[0])
 
 
 def shown() -> dict[str, str]:

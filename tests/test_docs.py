@@ -1,5 +1,6 @@
 """Every command and Python block of the README and the guide is run."""
 
+import json
 import re
 import shlex
 import shutil
@@ -43,6 +44,8 @@ def folder(tmp_path_factory):
         )
     labels = np.where(mask, 2, low.astype(int)).astype(np.uint8)
     pictures.write(path / "labels.png", np.repeat(labels[..., None], 3, 2))
+    edits = [{"op": "move", "layer": "cat", "by": [3, 4]}]
+    (path / "edits.json").write_text(json.dumps({"version": 1, "edits": edits}))
     return path
 
 
@@ -52,7 +55,7 @@ def test_commands_run(page, folder):
     if not (folder / "photo.pxi").exists():
         run([*tool("pxi-encode"), "photo.png", "--preset", "fast"], folder)
     for words in commands(page):
-        force = words[0] == "pxi-encode" and "--force" not in words
+        force = words[0] in ("pxi-encode", "pxi-edit") and "--force" not in words
         run([*tool(words[0]), *words[1:], *(["--force"] if force else [])], folder)
 
 

@@ -1,25 +1,36 @@
 import importlib
 import re
-from dataclasses import fields
+import sys
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from conformance import pixels
+from conformance.cases import load
 from proxyimg_codec.container import chunks
 from proxyimg_codec.entropy import arrays, rans
 from proxyimg_codec.errors import FormatError
-from proxyimg_codec.geometry import boundary, coverage
+from proxyimg_codec.geometry import boundary, coverage, deltas, mesh, pose, warp
+from proxyimg_codec.geometry.mesh import Base, Mesh
+from proxyimg_codec.geometry.pose import REST, Pose
 from proxyimg_codec.image import Image, Layer, Layers, from_bytes
 from proxyimg_codec.limits import Limits
 from proxyimg_codec.texture import diffusion
 from proxyimg_codec.texture.implicit import ImplicitTexture
 from proxyimg_codec.texture.network import NetShape, Network
+from tests.geometry.test_mesh import lattice
 
 ROOT = Path(__file__).parents[1]
 SPEC = ROOT / "spec"
-CHAPTERS = {p.name: p.read_text("utf-8") for p in sorted(SPEC.glob("*.md"))}
-IDS = {"1": "CON", "2": "CHK", "3": "ENT", "4": "GEO", "5": "TEX", "6": "REN", "7": "MET"}
+NUMBERED = sorted(SPEC.glob("[0-9]*.md"), key=lambda p: int(p.name.partition("-")[0]))
+CHAPTERS = {p.name: p.read_text("utf-8") for p in (SPEC / "README.md", *NUMBERED)}
+IDS = dict(enumerate(("CON", "CHK", "ENT", "GEO", "TEX", "REN", "MET", "SEC", "", "MSH"), 1))
 PARTS = re.findall(r"^<!-- ((?!end )[^\n]+) -->$", "".join(CHAPTERS.values()), re.M)
 
 
@@ -63,14 +74,14 @@ def test_pixels_of_the_example_are_within_the_tolerance(example):
 
 def test_ids_are_unique_and_belong_to_their_chapter():
     ids = []
-    for name, text in CHAPTERS.items():
+    for number, text in enumerate(CHAPTERS.values()):
         found = re.findall(r"^\*\*\[([A-Z]{3})-(\d+)\]\*\* ", text, re.M)
-        assert {prefix for prefix, _ in found} <= {IDS.get(name[0], "SEC")}
+        assert {prefix for prefix, _ in found} <= {IDS.get(number)}
         assert [int(n) for _, n in found] == list(range(1, len(found) + 1))
         ids += [f"{prefix}-{n}" for prefix, n in found]
     assert len(set(ids)) == len(ids) > 80
     named = re.findall(r"\b([A-Z]{3}-\d+)\b", "".join(CHAPTERS.values()))
-    named = {n for n in named if n[:3] in {*IDS.values(), "SEC"}}
+    named = {n for n in named if n[:3] in IDS.values()}
     assert named <= set(ids)
 
 
@@ -92,6 +103,7 @@ def table(chapter):
         ("3-entropy.md", (rans, arrays), 7),
         ("4-geometry.md", (boundary, coverage), 5),
         ("5-texture.md", (diffusion,), 2),
+        ("10-mesh-and-pose.md", (mesh, pose, warp), 17),
     ],
 )
 def test_constants_are_those_of_the_code(chapter, modules, count):
@@ -178,41 +190,192 @@ def test_program_fills_codes(program, shape):
         assert got == diffusion.fill(codes, stored)[0].tolist()
 
 
-def random_image(seed):
-    """16x12 pixels, two layers, one of them cut out; unlike what any encoder makes."""
+@given(st.lists(st.integers(1 - (1 << 31), (1 << 31) - 1) | st.integers(-9, 9), min_size=1))
+@settings(max_examples=30, deadline=None)
+def test_program_decodes_signed_integers(program, values):
+    rows = np.array([values, values[::-1]], np.int64)
+    got = program["decode_signed"](*deltas.encode(rows), 2, len(values))
+    assert got == rows.tolist()
+
+
+def random_mesh(rng, columns=4, rows=4, levels=2, origin=(-4, -3), step=(560, 600), share=0.8):
+    """A mesh with holes, parts that touch in a point, and uneven refinement."""
+    count = 2 * (columns - 1) * (rows - 1)
+    keep = np.unique(np.append(np.flatnonzero(rng.random(count) < share), 0))
+    base = lattice(columns, rows, keep)
+    triangles = rng.permutation(base.triangles)
+    plain = Mesh.build(Base(origin, step, base.vertices, triangles))
+    flags, count = [], len(triangles)
+    for _ in range(levels):
+        flags.append(rng.random(count) < 0.4)
+        flags[-1][rng.integers(count)] = True
+        count = 4 * int(flags[-1].sum())
+    return plain.split(flags)
+
+
+def decoded(program, made):
+    """A mesh as the program sees it."""
+    return program["decode_mesh"](made.fields)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_program_decodes_meshes(program, seed):
     rng = np.random.default_rng(seed)
-    channels = 3 + seed % 2
+    step = (1, 3) if seed % 3 == 0 else (560, 1 << 24)
+    made = random_mesh(rng, *rng.integers(2, 8, 2), seed % 5, step=step)
+    nodes, ends, faces = decoded(program, made)
+    want = made.refined
+    assert nodes == [tuple(v) for v in want.nodes.tolist()]
+    assert ends == [tuple(v) for v in want.parents.tolist()]
+    assert faces == [tuple(v) for v in want.faces.tolist()]
+
+
+def test_program_decodes_meshes_with_far_symbols(program):
+    # Two parts that touch in a point: at the start of the second no gate is open.
+    made = Mesh.build(lattice(4, 4, [0, 1, 8, 9, 17]))
+    assert len(made.fields["far"]) >= 1
+    assert decoded(program, made)[2] == [tuple(v) for v in made.refined.faces.tolist()]
+
+
+def random_pose(rng, made, reach=40, affine=True):
+    count = len(made.refined.nodes)
+    nodes, places = rng.integers(-reach, reach + 1, (2, count, 2))
+    matrix, shift = REST.matrix, REST.shift
+    if affine:
+        matrix = tuple(rng.integers(-1 << 25, 1 << 25, 4).tolist())
+        shift = tuple(rng.integers(-9000, 9000, 2).tolist())
+    kind = rng.integers(4)
+    return Pose(
+        matrix, shift, nodes if kind != 1 else None, places if kind != 2 else None,
+        int(rng.integers(65536)), False,
+        tuple(rng.integers(-4096, 4097, 12).tolist()) if kind % 2 else (),
+    )  # fmt: skip
+
+
+def fields_of(posed, made):
+    """The map of a POSE."""
+    return pose.encode(posed, made)
+
+
+def as_lists(values):
+    return None if values is None else [tuple(v) for v in values.tolist()]
+
+
+def test_program_decodes_the_mesh_of_the_worked_example(program):
+    made = tool("tables").MESH
+    assert decoded(program, made)[2] == [tuple(v) for v in made.refined.faces.tolist()]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_program_decodes_poses(program, seed):
+    rng = np.random.default_rng(seed)
+    made = random_mesh(rng, levels=seed % 4)
+    posed = random_pose(rng, made, int(rng.choice([3, 900, (1 << 24) - 1])))
+    fields, there = fields_of(posed, made), decoded(program, made)
+    for kind, values in (("node", posed.nodes), ("place", posed.places)):
+        assert program["displacements"](fields, kind, there) == as_lists(values)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_program_finds_outlines(program, seed):
+    rng = np.random.default_rng(seed)
+    wide = seed % 4 == 3  # positions beyond what weights are computed from
+    step = (90000, 120000) if wide else (560, 600)
+    origin = (-(1 << 21), 5) if wide else (-4, -3)
+    made = random_mesh(rng, 3, 4, origin=origin, step=step, levels=1)
+    reach = int(rng.choice([30, (1 << 24) - 1]))
+    posed = random_pose(rng, made, reach, affine=seed % 3 > 0)
+    size = (160, 1 << 21)
+    shape = None
+    if seed % 6:
+        shape = random_boundary(rng, int(rng.choice([100, 1 << 25])), int(rng.integers(7)))
+    paths = None if shape is None else [[tuple(p) for p in path.tolist()] for path in shape.paths]
+    unit = 0 if shape is None else shape.unit
+    moves = as_lists(posed.nodes)
+    got = program["outline"](
+        paths, unit, size, fields_of(posed, made), moves, decoded(program, made)
+    )
+    want = warp.outline(shape, posed, made, size)
+    if want is None:
+        assert got == (None, 0)
+        return
+    assert got[1] == want.unit
+    assert [[list(p) for p in path] for path in got[0]] == [p.tolist() for p in want.paths]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_program_finds_texture_points(program, seed):
+    rng = np.random.default_rng(seed)
+    made = random_mesh(rng)
+    posed = random_pose(rng, made, affine=seed % 3 > 0)
+    fields, there = fields_of(posed, made), decoded(program, made)
+    moves, places = as_lists(posed.nodes), as_lists(posed.places)
+    locate = program["chart"](fields, moves, places, there, posed.bent)
+    chart = warp.Warp(posed, made)
+    y, x = (v.ravel() for v in np.mgrid[0:12, 0:16] + 0.5)
+    grid = np.zeros(2), np.ones(2), (0, 0, 16, 12)
+    shown = chart.locate(x, y, chart.faces(*grid).ravel() if posed.bent else None)
+    got = [locate(*p) for p in zip(x.tolist(), y.tolist(), strict=True)]
+    points = np.array([u for u, _, _ in got])
+    np.testing.assert_allclose(points, np.stack([shown.x, shown.y], 1), atol=1e-6)
+    if posed.bent:
+        faces = made.refined.faces[shown.face].tolist()
+        assert [list(face) for _, face, _ in got] == faces
+        np.testing.assert_allclose([w for _, _, w in got], shown.weights, atol=1e-6)
+
+
+def random_layer(rng, k, channels, dim, sampling):
+    """A network and the parts of a layer: texture, mesh and pose."""
+    bits = int(rng.integers(2, 9))
+    shape = NetShape(dim, int(rng.integers(4)), 5, int(rng.integers(1, 4)), channels)
+    top = 1 << (bits - 1)
+    weights = [rng.integers(-top, top, (o, i)).astype(np.int8) for i, o in shape.layers]
+    steps = rng.uniform(0.1, 0.4, shape.rows) / top
+    biases = rng.uniform(0, 0.5, shape.rows)
+    net = Network(shape, bits, tuple(weights), *map(np.float16, (steps, biases)))
+    stored = rng.random((5, 4)) < 0.6
+    stored[2, 1] = True
+    features = dim // 2 if sampling == 1 else dim
+    codes = np.where(stored, rng.integers(-top, top, (features, 5, 4)), 0).astype(np.int8)
+    made = random_mesh(rng, levels=int(rng.integers(3)), share=0.9)
+    texture = ImplicitTexture(k, bits, np.float16([1 / top] * features), codes, stored)
+    return net, texture, made, random_pose(rng, made, affine=k != 1)
+
+
+def random_image(seed):
+    """16x12 pixels: two layers with networks, a third that shows a texture of theirs, a hidden one.
+
+    Three are posed; of an opaque picture's back layer only the texture is displaced. Unlike what
+    any encoder makes.
+    """
+    rng = np.random.default_rng(seed)
+    channels, sampling = 3 + seed % 2, seed // 2 % 4
     nets, layers = [], []
     for k in range(2):
-        bits = int(rng.integers(2, 9))
-        shape = NetShape(3, int(rng.integers(4)), 5, int(rng.integers(1, 4)), channels)
-        top = 1 << (bits - 1)
-        weights = [rng.integers(-top, top, (o, i)).astype(np.int8) for i, o in shape.layers]
-        steps = rng.uniform(0.1, 0.4, shape.rows) / top
-        biases = rng.uniform(0, 0.5, shape.rows)
-        nets.append(Network(shape, bits, tuple(weights), *map(np.float16, (steps, biases))))
-        stored = rng.random((5, 4)) < 0.6
-        stored[2, 1] = True
-        codes = np.where(stored, rng.integers(-top, top, (3, 5, 4)), 0).astype(np.int8)
-        texture = ImplicitTexture(k, bits, np.float16([1 / top] * 3), codes, stored)
+        kind = sampling if k else 0
+        net, texture, made, posed = random_layer(rng, k, channels if k else 3, 4, kind)
+        if k == 0 and channels == 3:
+            posed = replace(REST, places=posed.places)
+        nets.append(net)
         shape_of = random_boundary(rng, 128) if k else None
-        layers.append(Layer(f"layer {k}", (-2, 1, 15, 9), shape_of, texture))
+        layers.append(Layer(f"layer {k}", (-2, 1, 15, 9), shape_of, texture, made, kind, posed))
+    made = random_mesh(rng)
+    posed, shape_of = random_pose(rng, made), random_boundary(rng, 128)
+    texture = layers[1].texture
+    layers.append(Layer("copy", (3, 2, 9, 8), shape_of, texture, made, sampling, posed))
+    hidden = Pose(hidden=True)
+    layers.append(Layer("hidden", (0, 0, 16, 12), None, layers[0].texture, None, 0, hidden))
     return Image(16, 12, channels, channels == 3, 8, Layers(layers), tuple(nets))
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(8))
 @pytest.mark.parametrize("view", [((0, 0, 16, 12), (16, 12)), ((3, 2, 11, 7), (4, 19))])
 def test_program_renders_as_the_package_does(program, seed, view):
     image = random_image(seed)
-    got = np.array(program["decode"](image.to_bytes(), *view), int)
-    want = image.render(region=view[0], width=view[1][0], height=view[1][1]).astype(int)
+    got = np.array(program["decode"](image.to_bytes(), *view))
+    want = image.render(region=view[0], width=view[1][0], height=view[1][1])
     assert got.shape == want.shape
-    off = np.abs(got - want)
-    if image.channels == 4:
-        off[want[..., 3] == 0, :3] = 0
-        assert off[want[..., 3] < 16].max(initial=0) <= 2
-        off = off[want[..., 3] >= 16]
-    assert off.max(initial=0) <= 1
+    assert close(got, want)
 
 
 def test_program_decodes_the_example(program, example):
@@ -227,12 +390,51 @@ def test_program_refuses_a_damaged_example(program, example):
             program["read_chunks"](bytes(data))
 
 
+def close(got, want):
+    """Whether 8-bit pixels agree with others within the tolerance."""
+    off = np.abs(got.astype(float) - want)
+    if want.shape[2] == 4:
+        off[want[..., 3] == 0, :3] = 0
+        assert off[want[..., 3] < 16].max(initial=0) <= 2
+        off = off[want[..., 3] >= 16]
+    return off.max(initial=0) <= 1
+
+
+CASES = [c for c in load() if not c.error]
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda c: c.name)
+def test_program_passes_the_conformance_suite(program, case):
+    want = pixels.read(case.renders[0].expected.read_bytes()) / 257
+    args = case.renders[0].args
+    size = (want.shape[1], want.shape[0])
+    data = case.input.read_bytes()
+    got = program["decode"](data, args.get("region"), size, args.get("layers"))
+    assert close(np.array(got), want)
+
+
 def test_dump_covers_every_byte(small_pxi, example, capsys):
     dump = tool("dump")
-    for data in (small_pxi.read_bytes(), example):
+    posed = [c.input.read_bytes() for c in CASES if c.name in ("closing-deep", "shared", "undo")]
+    for data in (small_pxi.read_bytes(), example, *posed):
         assert sum(size for size, _ in dump.pieces(data)) == len(data)
     assert dump.main([str(SPEC / "example.pxi")]) == 0
     assert capsys.readouterr().out == "\n".join(dump.dump(example)) + "\n"
     shown = re.findall(r"^\w{6}  ((?:[\da-f]{2} ?)+)", "\n".join(dump.dump(example)), re.M)
     assert bytes.fromhex("".join(shown)) == example
     assert dump.main([str(SPEC / "README.md")]) == FormatError.exit_code
+
+
+def test_dump_prints_meshes_and_poses():
+    dump = tool("dump")
+    data = {c.name: c.input.read_bytes() for c in CASES}
+    lines = list(dump.values(from_bytes(data["all-displaced"])))
+    image = from_bytes(data["all-displaced"]).layers[1]
+    nodes = [tuple(v) for v in image.mesh.refined.nodes.tolist()]
+    at = lines.index(f"layer 'disc', {len(nodes)} nodes in 1/1024 pixel")
+    assert lines[at + 1] == "  " + " ".join(map(str, nodes[:8]))
+    for name in ("nodes", "texture"):
+        assert f"layer 'disc', displacements of the {name} in 1/16 pixel" in lines
+    assert "  matrix [10066329, 13421772, -13421773, 10066329] shift [12001, -6003]" in lines
+    lines = list(dump.values(from_bytes(data["shared"])))
+    assert "layer 'copy' shows the texture of 'disc'" in lines

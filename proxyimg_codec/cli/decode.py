@@ -1,4 +1,4 @@
-"""pxi-decode: a .pxi file becomes a picture of any size, or an ONNX model."""
+"""pxi-decode: a .pxi file becomes a picture of any size, its layers, outlines, or an ONNX model."""
 
 from __future__ import annotations
 
@@ -6,18 +6,23 @@ import argparse
 import os
 import sys
 import time
+from pathlib import Path
 from typing import Any
 
 from ..errors import UsageError
 from .common import Bar, check_target, default_target, parser, run
+
+LAYERED = (".ora", ".svg")
+"""Suffixes of files that hold layers, not one picture."""
 
 
 def arguments() -> argparse.ArgumentParser:
     """The command line."""
     p = parser("pxi-decode", "Render a .pxi file at any size and region.")
     p.add_argument("input", metavar="IN", help=".pxi file, or - for standard input")
-    p.add_argument("output", metavar="OUT", nargs="?", help="picture file, type by suffix; - "
-                   "writes PNG to standard output; IN with the suffix .png by default")  # fmt: skip
+    p.add_argument("output", metavar="OUT", nargs="?", help="picture file, type by suffix; "
+                   ".ora writes the layers, .svg their outlines; - writes PNG to standard output; "
+                   "IN with the suffix .png by default")  # fmt: skip
     add = p.add_argument
     add("--scale", type=float, help="output pixels a canvas pixel")
     add("--width", type=int, help="output width; the height follows")
@@ -45,7 +50,9 @@ def decode_file(args: argparse.Namespace) -> None:
     """Does what the command line asks for."""
     rendering = args.output is not None or args.export_onnx is None
     output = target(args) if rendering else ""
+    kind = Path(output).suffix.lower()
     if rendering:
+        refuse_for_layers(args, kind)
         check_target(output, args.force, args.input)
     else:
         refuse_render_flags(args)
@@ -61,7 +68,10 @@ def decode_file(args: argparse.Namespace) -> None:
     if args.export_onnx is not None:
         export(image, args)
     if rendering:
-        render(image, output, args)
+        if kind in LAYERED:
+            layered(image, output, kind, args)
+        else:
+            render(image, output, args)
         if not args.quiet:
             print(f"{output}: {time.perf_counter() - started:.2f} s", file=sys.stderr)
 
@@ -79,6 +89,21 @@ def refuse_render_flags(args: argparse.Namespace) -> None:
             raise UsageError(f"--{name.replace('_', '-')} needs an output picture")
     if args.engine != "auto":
         raise UsageError("--engine needs an output picture")
+
+
+def refuse_for_layers(args: argparse.Namespace, kind: str) -> None:
+    """Files of layers are as large as the canvas, and hold what their format can.
+
+    Raises:
+        UsageError: A flag was given that such a file cannot follow.
+    """
+    if kind not in LAYERED:
+        return
+    for name in ("scale", "width", "height", "region"):
+        if getattr(args, name) is not None:
+            raise UsageError(f"--{name}: a {kind} file has the size of the canvas")
+    if args.bit_depth is not None and (kind == ".svg" or args.bit_depth == 32):
+        raise UsageError(f"--bit-depth {args.bit_depth} makes no sense for a {kind} file")
 
 
 def target(args: argparse.Namespace) -> str:
@@ -136,6 +161,28 @@ def render(image: Any, output: str, args: argparse.Namespace) -> None:
     finally:
         bar.close()
     write(output, pixels, image.blocks, ".png" if output == "-" else None)
+
+
+def layered(image: Any, output: str, kind: str, args: argparse.Namespace) -> None:
+    """Writes the layers as OpenRaster, or their outlines as SVG."""
+    from ..files import write_atomically
+
+    layers = [key(n) for n in args.layer] if args.layer else None
+    wanted = {"layers": layers, "background": not args.no_background, "engine": args.engine}
+    if kind == ".svg":
+        from ..export.svg import build as build_svg
+
+        write_atomically(output, build_svg(image, **wanted))
+        return
+    from ..export.openraster import build as build_ora
+
+    bar = Bar(len(selected(image, args.layer)), "layers", args.quiet)
+    try:
+        dtype = "uint16" if args.bit_depth == 16 else "uint8"
+        data = build_ora(image, **wanted, dtype=dtype, progress=bar.advance)
+    finally:
+        bar.close()
+    write_atomically(output, data)
 
 
 def parse_region(text: str | None) -> tuple[int, int, int, int] | None:

@@ -1,4 +1,4 @@
-"""pxi-encode: a picture becomes a .pxi file."""
+"""pxi-encode: a picture, flat or in layers, becomes a .pxi file."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ import json
 import os
 import sys
 import time
-from dataclasses import fields
+from dataclasses import fields, replace
+from pathlib import Path
 from typing import Any
 
 from .common import Bar, check_target, default_target, parser, run
 
-PRESET_NAMES = ("fast", "default", "best")
+PRESET_NAMES = ("fast", "default", "best", "paper")
 
 
 def arguments() -> argparse.ArgumentParser:
@@ -20,25 +21,29 @@ def arguments() -> argparse.ArgumentParser:
     p = parser(
         "pxi-encode", "Encode a picture as .pxi: layers, Bézier boundaries, fitted textures."
     )
-    p.add_argument("input", metavar="IN", help="picture file, or - for standard input")
+    p.add_argument("input", metavar="IN", help="picture file, .ora file whose layers become "
+                   "those of OUT, or - for standard input")  # fmt: skip
     p.add_argument("output", metavar="OUT", nargs="?", help=".pxi file, - for standard output; "
                    "IN with the suffix .pxi by default")  # fmt: skip
     add = p.add_argument
     add("-q", "--quality", type=float, default=50, metavar="0-100", help="default 50")
     add("-e", "--effort", type=int, metavar="1-9", help="how long to optimize; default 5")
     add("--preset", choices=PRESET_NAMES, default="default",
-        help="effort 2, 5 or 8; --effort goes before it")  # fmt: skip
+        help="effort 2, 5 or 8; paper: the literal method of ProxyImg, 4-bit codes and network, "
+        "Chamfer boundaries. Other flags go before it")  # fmt: skip
     add("--masks", metavar="PATH", help="folder of mask PNGs, or one label PNG: the layers to make")
     add("--max-layers", type=int, metavar="N", help="most layers found; default 4")
     add("--layers", type=int, choices=[1], help="1: one layer, no decomposition")
     add("--segmenter", metavar="NAME", help="who finds layers; default regions, "
         "others are added by plug-in packages")  # fmt: skip
-    add("--boundary", choices=["lsq", "chamfer"], default="lsq", help="boundary fit: least squares "
+    add("--boundary", choices=["lsq", "chamfer"], help="boundary fit: least squares "
         "(default), or the slower adaptive Chamfer fit of the paper")  # fmt: skip
     add("--background", choices=["diffuse", "complete"], default="diffuse", help="hidden parts of "
         "the back layer: filled when decoding (default), or optimized and stored")  # fmt: skip
+    add("--mesh", metavar="NAME", default="delaunay", help="who makes proxy nodes: delaunay "
+        "(default), triwild, ftetwild, or none")  # fmt: skip
     add("--feature-bits", type=int, metavar="2-8", help="bits a code; from quality by default")
-    add("--net-bits", type=int, default=8, metavar="2-8", help="bits a network weight; default 8")
+    add("--net-bits", type=int, metavar="2-8", help="bits a network weight; default 8")
     add("--seed", type=int, default=0, help="seed of everything random; default 0")
     add(
         "-j",
@@ -71,50 +76,28 @@ def encode_file(args: argparse.Namespace) -> None:
     check_target(output, args.force, args.input)
     settings = settings_from(args)
 
-    from ..pictures import read
-
-    started, cpu = time.perf_counter(), time.process_time()
-    picture = read(args.input)
-
-    from ..encoder.encode import encode
-    from ..encoder.masks import load_masks
+    from ..files import read_bytes, write_atomically
     from ..image import from_bytes
     from ..quality import psnr
 
-    height, width = picture.pixels.shape[:2]
-    masks = None if args.masks is None else load_masks(args.masks, width, height)
+    started, cpu = time.perf_counter(), time.process_time()
+    source = read_bytes(args.input)
     bar = Bar(settings.steps, "fitting", args.quiet or args.json)
-    seen = 0
-
-    def progress(stage: str, done: int, total: int) -> None:
-        nonlocal seen
-        if stage == "texture":
-            bar.advance(done - seen)
-            seen = done
-
     try:
-        image = encode(
-            picture.pixels,
-            settings,
-            masks=masks,
-            blocks={} if args.strip else picture.blocks,
-            progress=progress,
-        )
+        image, original = encoded(source, args, settings, bar)
     finally:
         bar.close()
     data = image.to_bytes()
 
-    from ..files import write_atomically
-
     # Of the file as it will be read, before it takes the place of an older one.
-    quality = psnr(picture.pixels, from_bytes(data))
+    quality = psnr(original, from_bytes(data))
     write_atomically(output, data)
     report = {
         "output": output,
-        "width": width,
-        "height": height,
+        "width": image.width,
+        "height": image.height,
         "bytes": len(data),
-        "bpp": round(8 * len(data) / (width * height), 4),
+        "bpp": round(8 * len(data) / (image.width * image.height), 4),
         "psnr": None if quality is None else round(quality, 3),
         "layers": [layer.name for layer in image.layers],
         "seconds": round(time.perf_counter() - started, 2),
@@ -126,9 +109,59 @@ def encode_file(args: argparse.Namespace) -> None:
         print(describe(report), file=sys.stderr)
 
 
+def encoded(source: bytes, args: argparse.Namespace, settings: Any, bar: Bar) -> tuple[Any, Any]:
+    """The image of a picture file in memory, and the pixels that it should show."""
+    from ..encoder.encode import encode
+    from ..encoder.import_layers import composite, encode_layers
+    from ..encoder.masks import load_masks
+    from ..encoder.openraster import is_openraster, read_openraster
+    from ..pictures import parse
+
+    seen = 0
+
+    def progress(stage: str, done: int, total: int) -> None:
+        nonlocal seen
+        if stage == "texture":
+            bar.advance(done - seen)
+            seen = done
+
+    name = "standard input" if args.input == "-" else args.input
+    if is_openraster(source) or Path(args.input).suffix.lower() == ".ora":
+        refuse_for_layers(args)
+        layered = read_openraster(source, name)
+        if args.strip:
+            layered = replace(layered, blocks={})
+        image, kept = encode_layers(layered, settings, progress)
+        for layer in () if args.quiet else kept.left_out:
+            print(f"{name}: layer {layer!r} has nothing to be seen; left out", file=sys.stderr)
+        return image, composite(layered)
+    picture = parse(source, name)
+    height, width = picture.pixels.shape[:2]
+    masks = None if args.masks is None else load_masks(args.masks, width, height)
+    blocks = {} if args.strip else picture.blocks
+    image = encode(picture.pixels, settings, masks=masks, blocks=blocks, progress=progress)
+    return image, picture.pixels
+
+
 def target(args: argparse.Namespace) -> str:
     """Where the output goes."""
     return default_target(args.input, ".pxi") if args.output is None else str(args.output)
+
+
+def refuse_for_layers(args: argparse.Namespace) -> None:
+    """A picture in layers is not decomposed, and hides nothing that would have to be guessed.
+
+    Raises:
+        UsageError: A flag that says how to do that was given.
+    """
+    from ..errors import UsageError
+
+    for name in ("masks", "layers", "max_layers", "segmenter"):
+        if getattr(args, name) is not None:
+            flag = name.replace("_", "-")
+            raise UsageError(f"--{flag}: the input has layers of its own, which are kept")
+    if args.background != "diffuse":
+        raise UsageError("--background: the layers of the input hide nothing unknown")
 
 
 def settings_from(args: argparse.Namespace) -> Any:
@@ -147,8 +180,8 @@ def settings_from(args: argparse.Namespace) -> Any:
         names = " and ".join(f"--{n.replace('_', '-')}" for n in rivals)
         raise UsageError(f"{names} contradict each other")
     names_of_settings = {f.name for f in fields(Settings)}
-    values = {k: v for k, v in vars(args).items() if k in names_of_settings and v is not None}
-    values["effort"] = PRESETS[args.preset] if args.effort is None else args.effort
+    given = {k: v for k, v in vars(args).items() if k in names_of_settings and v is not None}
+    values = PRESETS[args.preset] | given
     values["jobs"] = (os.cpu_count() or 1) if args.jobs is None else args.jobs
     if args.layers:
         values["max_layers"] = 1

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Mapping
 from typing import Any
 
 from ..container.chunks import VERSION
@@ -13,6 +14,7 @@ from ..files import read_bytes
 from .common import parser, run
 
 CODERS = {1: "implicit"}
+SAMPLINGS = ("direct", "node", "node, local only", "node, global only")
 
 
 def arguments() -> argparse.ArgumentParser:
@@ -40,8 +42,11 @@ def describe(c: Container, size: int) -> dict[str, Any]:
     """Facts about a file of `size` bytes, ready for JSON."""
     width, height = c.head["size"]
     areas = (c.info or {}).get("areas") or [None] * len(c.layers)
+    meshes = {m["layer"]: m for m in c.meshes}
+    poses = {p["layer"]: p for p in c.poses}
     layers = []
-    for layer, texture, area in zip(c.layers, c.textures, areas, strict=True):
+    for i, (layer, area) in enumerate(zip(c.layers, areas, strict=True)):
+        texture = c.texture_of(i)
         layers.append(
             {
                 "name": layer["name"],
@@ -52,8 +57,16 @@ def describe(c: Container, size: int) -> dict[str, Any]:
                 "grid": list(texture["grid"]),
                 "bits": texture["bits"],
                 "network": texture["network"],
+                "sampling": SAMPLINGS[layer["sampling"]],
+                "shares": c.textures[i].get("texture"),
+                "vertices": meshes[i]["vertices"] if i in meshes else None,
+                "pose": _pose(poses[i]) if i in poses else None,
                 "boundary_bytes": len(layer["classes"]) + len(layer["deltas"]),
-                "texture_bytes": len(texture["codes"]) + len(texture["stored"]),
+                "mesh_bytes": _bytes(meshes.get(i)),
+                "pose_bytes": _bytes(poses.get(i)),
+                "texture_bytes": 0
+                if texture is not c.textures[i]
+                else len(texture["codes"]) + len(texture["stored"]),
             }
         )
     networks = [
@@ -71,11 +84,34 @@ def describe(c: Container, size: int) -> dict[str, Any]:
         "depth": c.head["depth"],
         "layers": layers,
         "networks": networks,
+        "groups": c.tree["groups"] if c.tree else [],
+        "edits": [step.operation for step in c.history],
         "metadata": {name: len(block) for name, block in c.blocks.items()},
         "chunk_bytes": dict(c.sizes),
         "encoder": (c.info or {}).get("encoder"),
         "settings": settings(c),
     }
+
+
+def _bytes(fields: Mapping[str, Any] | None) -> int:
+    """Bytes of the coded parts of a chunk."""
+    return sum(len(v) for v in (fields or {}).values() if isinstance(v, bytes))
+
+
+def _pose(fields: Mapping[str, Any]) -> list[str]:
+    """What a pose does."""
+    return [
+        name
+        for name, done in (
+            ("moved", fields["matrix"] != [1 << 24, 0, 0, 1 << 24] or fields["shift"] != [0, 0]),
+            ("bent", bool(fields["node_classes"])),
+            ("retextured", bool(fields["place_classes"])),
+            ("translucent", fields["opacity"] < 65535),
+            ("hidden", bool(fields["hidden"])),
+            ("recoloured", bool(fields["colour"])),
+        )
+        if done
+    ]
 
 
 def settings(c: Container) -> Any:
@@ -98,16 +134,24 @@ def text(f: dict[str, Any]) -> str:
         x, y, w, h = v["box"]
         area = "" if v["area"] is None else f", {v['area']} px visible"
         outline = f"{v['segments']} segments" if v["segments"] else "whole canvas"
+        mesh = "" if v["vertices"] is None else f", {v['vertices']} vertices"
+        sampling = "" if v["sampling"] == "direct" else f" ({v['sampling']})"
+        shares = "" if v["shares"] is None else f" shared with layer {v['shares']}"
+        pose = "" if v["pose"] is None else f", {' and '.join(v['pose'])}"
+        sizes = [v[f"{part}_bytes"] for part in ("boundary", "mesh", "pose", "texture")]
         lines.append(
-            f"layer {i} {v['name']!r}: {w}x{h} at {x},{y}{area}, {outline}, {v['coder']} "
-            f"{v['grid'][0]}x{v['grid'][1]} codes of {v['bits']} bits, "
-            f"{v['boundary_bytes']} + {v['texture_bytes']} bytes"
+            f"layer {i} {v['name']!r}: {w}x{h} at {x},{y}{area}, {outline}{mesh}{pose}, "
+            f"{v['coder']}{sampling} {v['grid'][0]}x{v['grid'][1]} codes of {v['bits']} bits"
+            f"{shares}, {' + '.join(str(n) for n in sizes if n)} bytes"
         )
     for i, n in enumerate(f["networks"]):
         lines.append(
             f"network {i}: {n['dim']} features, {n['octaves']} octaves, {n['depth']} hidden layers "
             f"of {n['hidden']}, {n['channels']} outputs, {n['bits']} bits, {n['bytes']} bytes"
         )
+    if f["groups"]:
+        lines.append(f"groups: {', '.join(map(repr, f['groups']))}")
+    lines += [f"edit {i}: {text}" for i, text in enumerate(f["edits"], 1)]
     lines += [f"{name}: {size} bytes" for name, size in f["metadata"].items()]
     if f["encoder"]:
         lines.append(f"made by {f['encoder']!r}, {json.dumps(f['settings'])}")

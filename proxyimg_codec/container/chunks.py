@@ -17,7 +17,12 @@ from ..errors import FormatError, UnsupportedError
 from ..limits import DEFAULT_LIMITS, Limits
 
 SIGNATURE = b"\x89PXI\r\n\x1a\n"
-VERSION = (0, 1)
+VERSION = (0, 2)
+"""What is written."""
+
+READABLE = ((0, 1), (0, 2))
+"""What is read; 0.1 is 0.2 without meshes, poses and shared textures."""
+
 PREFIX = struct.Struct("<8sBBH")
 """Signature, major version, minor version, reserved (0)."""
 
@@ -66,10 +71,10 @@ def _check_prefix(data: bytes) -> None:
     if len(data) < PREFIX.size:
         raise FormatError("truncated in the signature", offset=len(data))
     _, major, minor, reserved = PREFIX.unpack_from(data)
-    if (major, minor) != VERSION:
+    if (major, minor) not in READABLE:
         raise UnsupportedError(
             f"the file has format version {major}.{minor}, this program reads "
-            f"{VERSION[0]}.{VERSION[1]}; update proxyimg-codec"
+            f"{' and '.join(f'{a}.{b}' for a, b in READABLE)}; update proxyimg-codec"
         )
     if reserved:
         raise FormatError("reserved field is not zero", offset=10)

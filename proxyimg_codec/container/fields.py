@@ -15,6 +15,9 @@ import msgpack
 
 from ..errors import FormatError
 
+_TYPES = {"bin": "bytes", "ints": "list", "strs": "list"}
+"""Python types of the kinds that are not called as they are."""
+
 
 @dataclass(frozen=True)
 class Field:
@@ -22,9 +25,9 @@ class Field:
 
     Attributes:
         key: Name in the map.
-        kind: ``int``, ``str``, ``bin`` or ``ints`` (an array of integers).
+        kind: ``int``, ``str``, ``bin``, ``ints`` (an array of integers) or ``strs`` (of strings).
         meaning: One sentence for the specification.
-        low: Smallest integer, or smallest number of bytes/characters/items.
+        low: Smallest integer, or smallest number of bytes or characters.
         high: Largest, likewise.
         items: Exact number of items of an ``ints`` field whose items lie in low..high; 0 = any.
     """
@@ -38,8 +41,12 @@ class Field:
 
     def problem(self, value: Any) -> str | None:
         """Why `value` does not fit, or None."""
-        if type(value).__name__ != {"bin": "bytes", "ints": "list"}.get(self.kind, self.kind):
+        if type(value).__name__ != _TYPES.get(self.kind, self.kind):
             return f"is not of type {self.kind}"
+        if self.kind == "strs":
+            if any(type(v) is not str or not self.low <= len(v) <= self.high for v in value):
+                return f"has an item that is not a string of {self.low}..{self.high} characters"
+            return None
         if self.kind == "ints":
             if any(type(v) is not int or not self.low <= v <= self.high for v in value):
                 return f"has an item that is not an integer in {self.low}..{self.high}"

@@ -28,8 +28,13 @@ INFO_FIELDS = (
 
 def compress(block: bytes) -> bytes:
     """Payload of a metadata chunk holding `block`."""
-    frame = zstandard.ZstdCompressor(level=19).compress(block)
-    return pack(FIELDS, {"size": len(block), "zstd": frame})
+    return pack(FIELDS, {"size": len(block), "zstd": compressed(block)})
+
+
+def compressed(block: bytes) -> bytes:
+    """The zstd frame of a block."""
+    frame: bytes = zstandard.ZstdCompressor(level=19).compress(block)
+    return frame
 
 
 def decompress(payload: bytes, where: str, limits: Limits) -> bytes:
@@ -40,16 +45,25 @@ def decompress(payload: bytes, where: str, limits: Limits) -> bytes:
         LimitError: Larger than the limit.
     """
     values = unpack(FIELDS, payload, where)
-    limits.check("metadata_bytes", values["size"])
+    return decompressed(values["size"], values["zstd"], where, limits)
+
+
+def decompressed(size: int, frame: bytes, where: str, limits: Limits) -> bytes:
+    """The block of `size` bytes that `frame` holds, never larger than `limits.metadata_bytes`.
+
+    Raises:
+        FormatError: Not a zstd frame of that size.
+        LimitError: Larger than the limit.
+    """
+    limits.check("metadata_bytes", size)
     try:
         decompressor = zstandard.ZstdDecompressor(max_window_size=WINDOW_MAX)
-        reader = decompressor.stream_reader(values["zstd"])
-        block: bytes = reader.read(values["size"] + 1)
+        block: bytes = decompressor.stream_reader(frame).read(size + 1)
     except zstandard.ZstdError:
         raise FormatError("metadata is not a zstd frame", where) from None
-    if len(block) != values["size"]:
-        raise FormatError(f"metadata does not have the stated {values['size']} bytes", where)
-    if _frame_end(values["zstd"], where) != len(values["zstd"]):
+    if len(block) != size:
+        raise FormatError(f"metadata does not have the stated {size} bytes", where)
+    if _frame_end(frame, where) != len(frame):
         raise FormatError("bytes follow the zstd frame", where)
     return block
 

@@ -17,9 +17,11 @@ from ..image import Image, Layer, Layers
 from ..limits import DEFAULT_LIMITS
 from ..texture.implicit import ImplicitTexture
 from ..texture.network import Floats, NetShape, Network
-from . import fit
-from .layers import plan_layers
+from . import fit, node
+from .hidden import extended
+from .layers import Plan, plan_layers
 from .masks import Region
+from .meshes import with_meshes
 from .problem import Problem, build
 from .settings import Settings
 
@@ -69,7 +71,7 @@ def encode(
     report = progress or (lambda stage, done, total: None)
     picture, depth = to_float(pixels)
     DEFAULT_LIMITS.check("side", max(picture.shape[:2]))
-    _check_blocks(blocks or {})
+    check_blocks(blocks or {})
     report("layers", 0, 1)
     plan = plan_layers(picture, settings, masks)
     report("layers", 1, 1)
@@ -77,13 +79,44 @@ def encode(
         raise UsageError("background complete needs an opaque picture")
 
     height, width = picture.shape[:2]
-    shape = settings.network(height * width, plan.channels)
     premultiplied = picture.copy()
     premultiplied[..., :3] *= picture[..., 3:]
+    plan = with_meshes(premultiplied, plan, settings)
     outlines = [layer.boundary for layer in plan.layers]
-    problem = build(premultiplied, outlines, shape, settings.spacing)
+
+    def problem_of(shape: NetShape, spacing: float) -> Problem:
+        problem = build(premultiplied, outlines, shape, spacing)
+        if outlines[0] is None and settings.sampling == "direct":
+            problem = extended(problem, width, height, spacing)
+        return problem
+
+    image = fit_image(problem_of, height * width, plan, (width, height), settings, report)
+    return replace(image, depth=depth, blocks=dict(blocks or {}))
+
+
+def fit_image(
+    problem_of: Callable[[NetShape, float], Problem],
+    pixels: int,
+    plan: Plan,
+    size: tuple[int, int],
+    settings: Settings,
+    report: Callable[[str, int, int], None],
+) -> Image:
+    """The 8-bit picture, without metadata, of planned layers.
+
+    Args:
+        problem_of: The fitting problem for a network and a spacing of codes.
+        pixels: Number of pixels to learn; sets the size of the network.
+        plan: The layers.
+        size: Width and height of the canvas.
+        settings: What is asked for.
+        report: As `Progress`.
+    """
+    problem = problem_of(settings.network(pixels, plan.channels), settings.spacing)
     if (problem.target == problem.target[0]).all():
-        problem = build(premultiplied, outlines, NetShape(1, 0, 1, 1, plan.channels), np.inf)
+        problem = problem_of(NetShape(1, 0, 1, 1, plan.channels), np.inf)
+    elif settings.sampling == "node":
+        problem = node.build(problem, plan.layers, size, node.options_for(settings))
     state, stored = _fit(problem, settings, report)
     network, textures = assemble(problem, state, stored, settings)
     info = {
@@ -92,16 +125,14 @@ def encode(
         "areas": list(problem.areas),
     }
     layers = [
-        Layer(layer.name, plane.box, layer.boundary, texture)
+        Layer(layer.name, plane.box, layer.boundary, texture, layer.mesh, problem.sampling)
         for layer, plane, texture in zip(plan.layers, problem.planes, textures, strict=True)
     ]
-    return Image(
-        width, height, plan.channels, plan.opaque, depth, Layers(layers), (network,),
-        dict(blocks or {}), info,
-    )  # fmt: skip
+    return Image(*size, plan.channels, plan.opaque, 8, Layers(layers), (network,), info=info)
 
 
-def _check_blocks(blocks: Mapping[str, bytes]) -> None:
+def check_blocks(blocks: Mapping[str, bytes]) -> None:
+    """Raises `UsageError` for metadata that a file cannot hold."""
     for name, block in blocks.items():
         if name not in meta.BLOCKS or not block:
             raise UsageError(
@@ -155,10 +186,18 @@ def _fit(
         done += count
         report("texture", done, settings.steps)
 
-    state = fit.fit(
-        problem, settings.steps, settings.bits, settings.net_bits, settings.seed,
-        settings.device, settings.jobs, step,
-    )  # fmt: skip
+    if isinstance(problem, node.NodeProblem):
+        from .fit_node import fit_quantized
+
+        state = fit_quantized(
+            problem, settings.steps, settings.bits, settings.net_bits, settings.seed,
+            settings.device, step,
+        )  # fmt: skip
+    else:
+        state = fit.fit(
+            problem, settings.steps, settings.bits, settings.net_bits, settings.seed,
+            settings.device, settings.jobs, step,
+        )  # fmt: skip
     stored = problem.stored()
     if settings.background == "complete":
         from .background import complete
@@ -205,7 +244,7 @@ def assemble(
                 0,
                 settings.bits,
                 state.code_steps[k].astype(np.float16),
-                np.ascontiguousarray(codes).reshape(shape.dim, plane.rows, plane.columns),
+                np.ascontiguousarray(codes).reshape(-1, plane.rows, plane.columns),
                 stored[k],
             )
         )

@@ -29,20 +29,21 @@ class TorchTrainer:
             raise UnsupportedError("device cuda: torch finds no CUDA device; use --device cpu")
         torch.set_num_threads(min(jobs, os.cpu_count() or 1))
         self._torch, self._device, self._shape = torch, device, problem.shape
-        self._first = self._tensor(problem.first).long()
+        self._first = self.tensor(problem.first).long()
         self._taps = [
-            self._tensor(a) for a in (problem.base, problem.stride, problem.fx, problem.fy)
+            self.tensor(a) for a in (problem.base, problem.stride, problem.fx, problem.fy)
         ]
-        self._coverage = self._tensor(problem.coverage)
-        self._learn = self._tensor(problem.learn)[:, None]
+        self._coverage = self.tensor(problem.coverage)
+        self._learn = self.tensor(problem.learn)[:, None]
         prior = problem.prior
-        self._prior = [self._tensor(a) for a in (prior.rows, prior.next, prior.weight)]
-        self._target = self._tensor(problem.target)
+        self._prior = [self.tensor(a) for a in (prior.rows, prior.next, prior.weight)]
+        self._target = self.tensor(problem.target)
         plane = np.repeat(np.arange(len(problem.planes)), [p.size for p in problem.planes])
-        self._plane = self._tensor(plane)
+        self._plane = self.tensor(plane)
         self._parameters: list[Any] = []
 
-    def _tensor(self, array: NDArray[Any]) -> Any:
+    def tensor(self, array: NDArray[Any]) -> Any:
+        """An array on the device; shares memory on a CPU."""
         return self._torch.from_numpy(array).to(self._device)
 
     def run(
@@ -53,14 +54,14 @@ class TorchTrainer:
         flat = [a for pair in rows_of(self._shape, state.weights) for a in pair]
         if not self._parameters:
             self._parameters = [
-                self._tensor(a.copy()).requires_grad_() for a in (state.codes, *flat)
+                self.tensor(a.copy()).requires_grad_() for a in (state.codes, *flat)
             ]
             groups = [{"params": self._parameters[:1]}, {"params": self._parameters[1:]}]
             self._adam = torch.optim.Adam(groups, lr=0.0, betas=(0.9, 0.99), eps=1e-8)
-        steps = self._tensor(state.code_steps)[self._plane] if state.code_bits else None
+        steps = self.tensor(state.code_steps)[self._plane] if state.code_bits else None
         ends = np.cumsum([o for _, o in self._shape.layers])[:-1]
-        rows = [self._tensor(s) for s in np.split(state.row_steps, ends)]
-        batches = self._tensor(pixels).long()
+        rows = [self.tensor(s) for s in np.split(state.row_steps, ends)]
+        batches = self.tensor(pixels).long()
         self._clamp(steps, state.code_bits)
         total = 0.0
         for i, batch in enumerate(batches):
@@ -103,8 +104,7 @@ class TorchTrainer:
         offset = torch.arange(len(owner), device=batch.device)
         rank = offset - (torch.cumsum(count, 0) - count)[owner]
         entry = start[owner] + rank
-        features = interpolate(codes, *(t[entry] for t in self._taps))
-        output = run_network(features, net, self._shape.octaves)
+        output = run_network(self.features(codes, entry), net, self._shape.octaves)
         learn = self._learn[entry]
         output = learn * output + (1 - learn) * output.detach()
         coverage = self._coverage[entry]
@@ -118,6 +118,10 @@ class TorchTrainer:
             alpha = p[:, 3].clamp(0, 1) if p.shape[1] == 4 else 1.0
             clear = clear.index_copy(0, pixel, clear[pixel] * (1 - c * alpha))
         return ((result - self._target[batch]) ** 2).mean()
+
+    def features(self, codes: Any, entry: Any) -> Any:
+        """Features of entries, before the encoding."""
+        return interpolate(codes, *(t[entry] for t in self._taps))
 
     def _smoothness(self, codes: Any) -> Any:
         """Half the weighted squared distance of little known codes from their neighbours."""

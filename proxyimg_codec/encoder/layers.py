@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from .. import plugins
 from ..errors import InputError
 from ..geometry.boundary import Boundary
+from ..geometry.mesh import Mesh
 from ..texture.network import Floats
 from .contours import fit_paths
 from .masks import Region, resolve
@@ -39,10 +40,11 @@ FINE_TOLERANCE: dict[str, dict[str, float]] = {"lsq": {"tolerance": 1.2}, "chamf
 
 @dataclass(frozen=True, eq=False)
 class LayerPlan:
-    """A layer to be: its name and boundary (None = the whole canvas)."""
+    """A layer to be: its name, boundary (None = the whole canvas), and mesh."""
 
     name: str
     boundary: Boundary | None
+    mesh: Mesh | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -37,11 +37,11 @@ def load_masks(path: str | Path, width: int, height: int) -> list[Region]:
 
     Args:
         path: A folder of PNG files, one binary mask each (inside: luminance >= 128, or any
-            non-zero value where that is never reached; with transparency, alpha >= 128), named
-            by the file and put back to front in the natural order of the file names, `back` or
-            `background` first. Or one label PNG: label 0 is the back layer, 1, 2, ... are
-            objects back to front. A grey value is its label; distinct colours are labelled
-            in the order of their packed value 0xRRGGBB.
+            non-zero value where that is never reached; with transparency, alpha >= 128), put
+            back to front in the natural order of the file names, `back` or `background` first,
+            and named by them without a number in front (`2 cat.png` is `cat`). Or one label
+            PNG: label 0 is the back layer, 1, 2, ... are objects back to front. A grey value is
+            its label; distinct colours are labelled in the order of their packed value 0xRRGGBB.
         width: Width of the picture in pixels.
         height: Height of the picture in pixels.
 
@@ -170,8 +170,9 @@ def _colour_word(rgb: NDArray[np.float32]) -> str:
 
 
 def _name(file: Path) -> str:
-    """The file's stem as valid Unicode, short enough for the format."""
-    return file.stem.encode("utf-8", "replace").decode()[:200]
+    """The file's stem without the number that orders it, as valid Unicode, short enough."""
+    stem = file.stem.encode("utf-8", "replace").decode()
+    return re.sub(r"^\d+[ ._-]+(?=.)", "", stem)[:200]
 
 
 def _is_back(region: Region) -> bool:

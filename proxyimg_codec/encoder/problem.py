@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +15,7 @@ from ..render.compose import outline
 from ..render.view import View
 from ..texture.implicit import Box, taps
 from ..texture.network import Floats, NetShape
+from ..texture.node import DIRECT
 
 LAYERS_MAX = 64
 """Most layers of a picture that is encoded."""
@@ -90,6 +91,11 @@ class Problem:
     areas: tuple[int, ...]
 
     @property
+    def sampling(self) -> int:
+        """How features are found, as in LAYR."""
+        return DIRECT
+
+    @property
     def codes(self) -> int:
         """Rows of the table of codes."""
         return self.planes[-1].start + self.planes[-1].size
@@ -130,36 +136,21 @@ def build(
 ) -> Problem:
     """The problem of a picture [H, W, 4] (premultiplied) with layers back to front."""
     height, width = picture.shape[:2]
-    planes: list[Plane] = []
-    for boundary in boundaries:
-        start = planes[-1].start + planes[-1].size if planes else 0
-        planes.append(plane_for(boundary, width, height, spacing, start))
-
+    planes = _planes(boundaries, width, height, spacing)
     clear = np.ones(height * width, np.float32)
     rim = np.zeros(height * width, bool)
     # Where a front layer is translucent, those behind show through and learn together with it.
     solid = picture[..., 3].ravel() == 1 if shape.channels == 4 else np.True_
     seen: list[NDArray[np.int64]] = []
-    parts: list[tuple[NDArray[Any], ...]] = []
+    parts: list[Entries] = []
     areas = [0] * len(planes)
     for k in range(len(planes) - 1, -1, -1):
-        covered = _coverage(boundaries[k], width, height)
-        at = np.flatnonzero((covered > 0) & (clear > 0))
-        share = covered.astype(np.float32) / cover.FULL
+        share = _share(boundaries[k], width, height)
+        at = np.flatnonzero((share > 0) & (clear > 0))
         areas[k] = round(float((share[at] * clear[at]).sum(dtype=np.float64)))
-        plane = planes[k]
-        t = taps(at % width + 0.5, at // width + 0.5, plane.box, plane.columns, plane.rows)
         seen.append(at)
-        parts.append(
-            (
-                t.base + np.int32(plane.start),
-                np.full(len(at), t.stride, np.int32),
-                t.fx,
-                t.fy,
-                share[at],
-                np.where(rim[at], 0, 1).astype(np.float32),
-            )
-        )
+        learn = np.where(rim[at], 0, 1).astype(np.float32)
+        parts.append(entries_of(planes[k], at, width, share[at], learn))
         hides = share * solid
         clear *= 1 - hides
         rim |= hides > 0
@@ -167,19 +158,94 @@ def build(
     order = np.argsort(pixel, kind="stable")
     ids, counts = np.unique(pixel, return_counts=True)
     assert counts.max() <= LAYERS_MAX, "the kernel composites at most LAYERS_MAX layers in a pixel"
-    base, stride, fx, fy, coverage, learn = (
-        np.concatenate(p)[order] for p in zip(*parts, strict=True)
-    )
+    entries = tuple(np.concatenate(p)[order] for p in zip(*parts, strict=True))
     target = picture.reshape(-1, 4)[ids, : shape.channels].astype(np.float32)
+    return _problem(shape, planes, spacing, counts, entries, target, areas)
+
+
+def build_apart(
+    picture_of: Callable[[int], Floats],
+    boundaries: Sequence[Boundary | None],
+    shape: NetShape,
+    spacing: float,
+    size: tuple[int, int],
+) -> Problem:
+    """The problem of layers that are known one by one: each learns all of its own pixels.
+
+    Args:
+        picture_of: The picture [H, W, 4] of layer k, straight alpha; clean under its outline.
+        boundaries: Of the layers, back to front.
+        shape: The network; without a fourth channel the alpha of pictures is that of outlines.
+        spacing: Canvas pixels between codes.
+        size: Width and height of the canvas.
+    """
+    width, height = size
+    planes = _planes(boundaries, width, height, spacing)
+    parts: list[Entries] = []
+    targets: list[Floats] = []
+    areas: list[int] = []
+    for k, plane in enumerate(planes):
+        share = _share(boundaries[k], width, height)
+        areas.append(round(float(share.sum(dtype=np.float64))))
+        at = np.flatnonzero(share > 0)
+        target = picture_of(k).reshape(-1, 4)[at]
+        if shape.channels == 4:
+            # What the outline's rim takes away counts already.
+            target[:, 3] = np.minimum(target[:, 3] / share[at], 1)
+            target[:, :3] *= target[:, 3:]
+        else:
+            target[:, 3] = 1
+        targets.append(target[:, : shape.channels])
+        # A rim pixel is one to be sure of as far as it is covered.
+        parts.append(entries_of(plane, at, width, np.ones_like(share[at]), share[at]))
+    entries = tuple(np.concatenate(p) for p in zip(*parts, strict=True))
+    target = np.concatenate(targets)
+    return _problem(shape, planes, spacing, np.ones(len(target), np.int64), entries, target, areas)
+
+
+Entries = tuple[NDArray[Any], ...]
+"""base, stride, fx, fy, coverage and learn of some entries, as in `Problem`."""
+
+
+def _planes(
+    boundaries: Sequence[Boundary | None], width: int, height: int, spacing: float
+) -> list[Plane]:
+    planes: list[Plane] = []
+    for boundary in boundaries:
+        start = planes[-1].start + planes[-1].size if planes else 0
+        planes.append(plane_for(boundary, width, height, spacing, start))
+    return planes
+
+
+def entries_of(
+    plane: Plane, at: NDArray[Any], width: int, coverage: Floats, learn: Floats
+) -> Entries:
+    """The entries of a layer in the pixels `at` [N] of a canvas of `width` columns."""
+    t = taps(at % width + 0.5, at // width + 0.5, plane.box, plane.columns, plane.rows)
+    stride = np.full(len(at), t.stride, np.int32)
+    return t.base + np.int32(plane.start), stride, t.fx, t.fy, coverage, learn
+
+
+def _problem(
+    shape: NetShape,
+    planes: Sequence[Plane],
+    spacing: float,
+    counts: NDArray[np.int64],
+    entries: Entries,
+    target: Floats,
+    areas: Sequence[int],
+) -> Problem:
+    """The problem of entries, `counts` of them in each pixel."""
+    base, stride, fx, fy, coverage, learn = entries
     first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
-    prior = _prior(planes, spacing, len(ids), base, stride, fx, fy, coverage * learn)
+    prior = prior_of(planes, spacing, len(counts), base, stride, fx, fy, coverage * learn)
     return Problem(
         shape, tuple(planes), first, base, stride, fx, fy, coverage, learn,
         np.ascontiguousarray(target), prior, tuple(areas),
     )  # fmt: skip
 
 
-def _prior(
+def prior_of(
     planes: Sequence[Plane],
     spacing: float,
     pixels: int,
@@ -218,8 +284,10 @@ def _prior(
     )
 
 
-def _coverage(boundary: Boundary | None, width: int, height: int) -> NDArray[np.int32]:
+def _share(boundary: Boundary | None, width: int, height: int) -> Floats:
+    """Coverage [width * height], 0..1."""
     paths = outline(boundary, View(0, 0, width, height, width, height))
     if paths is None:
-        return np.full(width * height, cover.FULL, np.int32)
-    return cover.coverage(paths, 0, 0, width, height).ravel()
+        return np.ones(width * height, np.float32)
+    covered = cover.coverage(paths, 0, 0, width, height).ravel()
+    return covered.astype(np.float32) * np.float32(1 / cover.FULL)

@@ -7,6 +7,7 @@ A package offers a part as an entry point in the group ``proxyimg_codec.KIND``:
 
 Kinds:
     segmenters: `(rgb, max_layers, support) -> list[Region]`, as `encoder.segment.segment`.
+    meshers: `(boundary, size, edge) -> Base`, as `geometry.mesher.delaunay`.
 """
 
 from __future__ import annotations
@@ -17,7 +18,14 @@ from typing import Any
 
 from ..errors import UsageError
 
-BUILT_IN = {"segmenters": {"regions": "proxyimg_codec.encoder.segment:segment"}}
+BUILT_IN = {
+    "segmenters": {"regions": "proxyimg_codec.encoder.segment:segment"},
+    "meshers": {
+        "delaunay": "proxyimg_codec.geometry.mesher:delaunay",
+        "triwild": "proxyimg_codec.encoder.wild:triwild",
+        "ftetwild": "proxyimg_codec.encoder.wild:ftetwild",
+    },
+}
 """Parts of this package: kind, name, and where the object is."""
 
 

@@ -1,8 +1,8 @@
-"""The reference renderer: coverage, texture, front-to-back compositing, averaging, in tiles."""
+"""The reference renderer: coverage, warp, texture, front-to-back compositing, in tiles."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,23 +10,31 @@ from numpy.typing import NDArray
 
 from ..geometry import coverage as cover
 from ..geometry.boundary import Boundary
+from ..geometry.mesh import FRACTION_BITS
+from ..geometry.pose import COLOUR_BITS, OPACITY_MAX
+from ..geometry.warp import Located, Warp
+from ..limits import DEFAULT_LIMITS, Limits
+from ..texture import node
 from ..texture.network import Floats
-from .engines import Engine
+from . import cache, engines
 from .view import View
 
 if TYPE_CHECKING:
     from ..image import Image, Layer
 
-TILE_SAMPLES = 1 << 18
-"""Samples rendered at a time: bounds the memory of any output."""
+TILE_SAMPLES = 1 << 16
+"""Samples rendered at a time: bounds the memory of any output, and keeps it in the cache."""
+
+Rectangle = tuple[int, int, int, int]
 
 
 def render(
     image: Image,
     view: View,
     layers: Sequence[Layer],
-    engine: Engine,
+    engine: str,
     out: Callable[[int, int, Floats], None],
+    limits: Limits = DEFAULT_LIMITS,
 ) -> None:
     """Renders `layers` (back to front) and hands finished tiles to `out`.
 
@@ -34,22 +42,121 @@ def render(
         image: The picture the layers belong to.
         view: Output size and region.
         layers: What to draw.
-        engine: Who runs the networks.
+        engine: Name of who runs the networks.
         out: Called with row, column and float32 [h, w, 4] premultiplied colour and alpha in 0..1.
+        limits: Bounds what deformed layers cost.
     """
     sx, sy = view.supersampling
-    outlines = [outline(layer.boundary, view) for layer in layers]
+    painters = [_Painter(image, layer, view, engine, limits) for layer in reversed(layers)]
     tile_w = max(min(view.width, TILE_SAMPLES // (sx * sy)), 1)
     tile_h = max(TILE_SAMPLES // (tile_w * sx * sy), 1)
     for row in range(0, view.height, tile_h):
         h = min(tile_h, view.height - row)
         for column in range(0, view.width, tile_w):
             w = min(tile_w, view.width - column)
-            box = (column * sx, row * sy, w * sx, h * sy)
-            samples = _tile(image, view, layers, outlines, engine, box)
+            samples = _tile(painters, (column * sx, row * sy, w * sx, h * sy))
             if sx * sy > 1:
                 samples = samples.reshape(h, sy, w, sx, 4).mean((1, 3), dtype=np.float32)
             out(row, column, samples)
+
+
+def _tile(painters: Sequence[_Painter], box: Rectangle) -> Floats:
+    """Samples [h, w, 4], premultiplied, of the sample rectangle `box` = x, y, w, h."""
+    _, _, w, h = box
+    result = np.zeros((h * w, 4), np.float32)
+    clear = np.ones(h * w, np.float32)
+    for painter in painters:
+        sheet = painter.sheet(box)
+        rows = slice(sheet.start, sheet.stop)
+        covered = np.float32(1) if sheet.coverage is None else sheet.coverage
+        weight = clear[rows] * covered
+        fresh = np.flatnonzero((weight > 0) & ~sheet.known)
+        if len(fresh):
+            painter.paint(sheet, box, fresh)
+        colour = painter.posed(sheet.colour)
+        result[rows] += weight[:, None] * colour
+        clear[rows] *= 1 - covered * colour[:, 3]
+    return result.reshape(h, w, 4)
+
+
+class _Painter:
+    """One layer on the sample grid of one view."""
+
+    def __init__(self, image: Image, layer: Layer, view: View, engine: str, limits: Limits) -> None:
+        self._image, self._layer, self._view = image, layer, view
+        self._engine = engine
+        self._run = engines.find(engine)
+        self._paths = outline(layer.outline, view)
+        self._warp = Warp(layer.pose, layer.mesh, layer.sampling in (1, 2), limits)
+        sx, sy = view.supersampling
+        self._caching = view.width * sx * view.height * sy <= cache.SAMPLES_MAX
+
+    def sheet(self, box: Rectangle) -> cache.Sheet:
+        """The layer on a rectangle of samples: its coverage, and the colours known so far."""
+        key = self._key(box)
+        found = self._image.cache.get(key) if self._caching else None
+        if found is None:
+            found = self._blank(box)
+            if self._caching:
+                self._image.cache.put(key, found)
+        return found
+
+    def _blank(self, box: Rectangle) -> cache.Sheet:
+        _, _, w, h = box
+        if self._paths is None:
+            return cache.Sheet(None, 0, h * w)
+        covered = cover.coverage(self._paths, *box)
+        seen = np.flatnonzero(covered.any(1))
+        first, last = (int(seen[0]), int(seen[-1]) + 1) if len(seen) else (0, 0)
+        share = covered[first:last].ravel() * np.float32(1 / cover.FULL)
+        return cache.Sheet(share, first * w, last * w)
+
+    def _key(self, box: Rectangle) -> Hashable:
+        """All that coverage and colour depend on. Models are immutable, so identity will do."""
+        layer, pose = self._layer, self._layer.pose
+        arrays = tuple(None if v is None else v.tobytes() for v in (pose.nodes, pose.places))
+        return (
+            layer.boundary, layer.texture, self._image.networks[layer.texture.network],
+            layer.mesh, layer.box, layer.sampling, pose.matrix, pose.shift, arrays,
+            self._view, box, self._engine,
+        )  # fmt: skip
+
+    def paint(self, sheet: cache.Sheet, box: Rectangle, at: NDArray[np.int64]) -> None:
+        """Computes the colours of the samples `at` of a sheet."""
+        everything = len(at) == len(sheet.known)
+        sheet.colour[slice(None) if everything else at] = self._textured(box, at + sheet.start)
+        sheet.known[at] = True
+
+    def posed(self, colour: Floats) -> Floats:
+        """Premultiplied colour [n, 4] as the pose shows it."""
+        pose = self._layer.pose
+        if pose.colour:
+            matrix = np.array(pose.colour, np.float32).reshape(3, 4) / (1 << COLOUR_BITS)
+            red, green, blue, alpha = colour.T.copy()
+            colour = colour.copy()
+            for k, (r, g, b, one) in enumerate(matrix):
+                mixed = r * red + g * green + b * blue + one * alpha
+                colour[:, k] = np.minimum(np.maximum(mixed, 0), alpha)
+        if pose.opacity != OPACITY_MAX:
+            colour = colour * np.float32(pose.opacity / OPACITY_MAX)
+        return colour
+
+    def _textured(self, box: Rectangle, at: NDArray[np.int64]) -> Floats:
+        """Premultiplied texture colour [n, 4] of the samples `at` of a rectangle."""
+        x0, y0, w, h = box
+        xs, ys = self._view.columns(x0, x0 + w), self._view.rows(y0, y0 + h)
+        x, y = xs[at % w], ys[at // w]
+        layer = self._layer
+        network = self._image.networks[layer.texture.network]
+        face = None
+        if self._warp.meshed:
+            faces = self._warp.faces(*self._view.grid, box)
+            face = faces.ravel()[at]
+        shown = self._warp.locate(x, y, face)
+        if layer.sampling:
+            return premultiplied(_at_nodes(self._image, layer, shown))
+        taps = layer.texture.taps(shown.x, shown.y, layer.box)
+        return premultiplied(self._run(layer.texture, network, taps))
 
 
 def outline(boundary: Boundary | None, view: View) -> list[NDArray[np.int64]] | None:
@@ -70,34 +177,21 @@ def outline(boundary: Boundary | None, view: View) -> list[NDArray[np.int64]] | 
     ]
 
 
-def _tile(
-    image: Image,
-    view: View,
-    layers: Sequence[Layer],
-    outlines: Sequence[list[NDArray[np.int64]] | None],
-    engine: Engine,
-    box: tuple[int, int, int, int],
-) -> Floats:
-    """Samples [h, w, 4], premultiplied, of the sample rectangle `box` = x, y, w, h."""
-    x0, y0, w, h = box
-    xs, ys = view.columns(x0, x0 + w), view.rows(y0, y0 + h)
-    result = np.zeros((h * w, 4), np.float32)
-    clear = np.ones(h * w, np.float32)
-    for layer, paths in zip(reversed(layers), reversed(outlines), strict=True):
-        if paths is None:
-            covered = np.full(h * w, cover.FULL, np.int32)
-        else:
-            covered = cover.coverage(paths, x0, y0, w, h).ravel()
-        at = np.flatnonzero((covered > 0) & (clear > 0))
-        if not len(at):
-            continue
-        network = image.networks[layer.texture.network]
-        taps = layer.texture.taps(xs[at % w], ys[at // w], layer.box)
-        colour = premultiplied(engine(layer.texture, network, taps))
-        colour *= (covered[at] * np.float32(1 / cover.FULL))[:, None]
-        result[at] += clear[at, None] * colour
-        clear[at] *= 1 - colour[:, 3]
-    return result.reshape(h, w, 4)
+def _at_nodes(image: Image, layer: Layer, shown: Located) -> Floats:
+    """Network outputs [n, channels] of a layer with node sampling."""
+    size = (image.width, image.height)
+    refined = layer.mesh.refined if layer.mesh else None
+    nodes = np.zeros((1, 2)) if refined is None else refined.nodes / (1 << FRACTION_BITS)
+    faces = np.zeros((1, 3), np.int32) if refined is None else refined.faces
+    count = len(shown.x)
+    features = node.features(
+        layer.texture, layer.box, layer.sampling, nodes, faces,
+        node.anchors(layer.boundary, size),
+        np.zeros(count, np.int64) if shown.face is None else shown.face,
+        np.zeros((count, 3)) if shown.weights is None else shown.weights,
+        np.stack([shown.x, shown.y], axis=1),
+    )  # fmt: skip
+    return engines.run_features(image.networks[layer.texture.network], features)
 
 
 def premultiplied(output: Floats) -> Floats:
@@ -109,6 +203,7 @@ def premultiplied(output: Floats) -> Floats:
     result = np.ones((len(output), 4), np.float32)
     if output.shape[1] == 4:
         result[:, 3] = np.fmin(np.fmax(output[:, 3], 0), 1)
-    # Unlike clip, fmax takes the number where the other is none.
-    result[:, :3] = np.fmin(np.fmax(output[:, :3], 0), result[:, 3:])
+    for k in range(3):
+        # Unlike clip, fmax takes the number where the other is none.
+        np.fmin(np.fmax(output[:, k], 0), result[:, 3], out=result[:, k])
     return result

@@ -45,6 +45,13 @@ class View:
         down = -(-self.region_height // self.height)
         return min(across, SUPERSAMPLING_MAX), min(down, SUPERSAMPLING_MAX)
 
+    @property
+    def grid(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Canvas point [2] of the corner of the sample grid, and samples a canvas pixel [2]."""
+        sx, sy = self.supersampling
+        pitch = [self.width * sx / self.region_width, self.height * sy / self.region_height]
+        return np.array([self.x, self.y], np.float64), np.array(pitch)
+
     def columns(self, start: int, stop: int) -> NDArray[np.float64]:
         """Canvas x of sample columns start..stop-1; samples sit at the centres of their cells."""
         n = self.width * self.supersampling[0]

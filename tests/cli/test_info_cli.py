@@ -124,3 +124,22 @@ def test_info_starts_fast(small_pxi):
         if i >= 4 and min(info) - min(bare) < 0.15:
             break
     assert min(info) - min(bare) < 0.15
+
+
+def test_edits_meshes_and_shared_textures_are_told(tool, small_pxi, tmp_path):
+    path = tmp_path / "edited.pxi"
+    tool("edit", small_pxi, path, "--duplicate", "disc=twin", "--move", "twin", "5,5",
+         "--opacity", "twin", ".5", "--group", "pair=disc,twin")  # fmt: skip
+    facts = json.loads(tool("info", path, "--json").out)
+    twin = facts["layers"][3]
+    assert (twin["name"], twin["shares"], twin["texture_bytes"]) == ("twin", 2, 0)
+    assert twin["pose"] == ["moved", "translucent"]
+    assert twin["grid"] == facts["layers"][2]["grid"]
+    assert facts["layers"][0]["vertices"] > 3
+    assert facts["layers"][2]["mesh_bytes"] > 20
+    assert facts["groups"] == ["pair"]
+    assert len(facts["edits"]) == 4
+    text = tool("info", path).out.decode()
+    assert "moved and translucent" in text
+    assert "shared with layer 2" in text
+    assert "edit 4: " in text

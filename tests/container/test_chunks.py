@@ -69,7 +69,18 @@ def test_bad_type_is_refused():
 def test_other_versions_are_unsupported_not_invalid():
     data = bytearray(FILE)
     data[8] = 1
-    with pytest.raises(UnsupportedError, match=r"1\.1"):
+    with pytest.raises(UnsupportedError, match=r"1\.2"):
+        read(bytes(data))
+
+
+@pytest.mark.parametrize(("minor", "known"), [(0, False), (1, True), (2, True), (3, False)])
+def test_known_versions_are_read(minor, known):
+    data = bytearray(FILE)
+    data[9] = minor
+    if known:
+        assert len(read(bytes(data))) == 3
+        return
+    with pytest.raises(UnsupportedError, match=rf"0\.{minor}, this program reads 0\.1 and 0\.2"):
         read(bytes(data))
 
 

@@ -9,8 +9,9 @@ FIELDS = (
     Field("name", "str", "A name.", 1, 5),
     Field("data", "bin", "Bytes.", 0, 4),
     Field("pair", "ints", "Two numbers.", -3, 3, items=2),
+    Field("names", "strs", "Names.", 1, 3),
 )
-GOOD = {"n": 4, "name": "abc", "data": b"xy", "pair": [-1, 2]}
+GOOD = {"n": 4, "name": "abc", "data": b"xy", "pair": [-1, 2], "names": ["a", "äöü"]}
 
 
 def test_round_trip():
@@ -23,7 +24,8 @@ def test_round_trip():
         {"n": 0}, {"n": 10}, {"n": True}, {"n": "4"}, {"n": 4.0}, {"n": None},
         {"name": ""}, {"name": "abcdef"}, {"name": b"abc"}, {"data": b"12345"}, {"data": "ab"},
         {"pair": [1]}, {"pair": [1, 2, 3]}, {"pair": [1, 4]}, {"pair": [1, 2.0]}, {"pair": 1},
-        {"extra": 1},
+        {"names": "ab"}, {"names": [""]}, {"names": ["abcd"]}, {"names": [1]}, {"names": [b"a"]},
+        {"names": [["a"]]}, {"extra": 1},
     ],
 )  # fmt: skip
 def test_values_out_of_their_declaration_are_refused(change):

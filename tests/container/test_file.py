@@ -3,8 +3,9 @@ from dataclasses import replace
 import pytest
 
 from proxyimg_codec import from_bytes
-from proxyimg_codec.container import meta
+from proxyimg_codec.container import meta, tree
 from proxyimg_codec.container.chunks import Chunk, read, write
+from proxyimg_codec.container.fields import pack
 from proxyimg_codec.container.file import parse, serialize
 from proxyimg_codec.errors import FormatError, LimitError, UnsupportedError
 from proxyimg_codec.limits import Limits
@@ -20,13 +21,21 @@ def container(data):
     return parse(data)
 
 
+@pytest.fixture(scope="module")
+def plain(container):
+    """Without meshes: chunks 0 HEAD, 1 to 3 LAYR, 4 NETW, 5 to 7 TEXR, 8 iNFO, 9 TAIL."""
+    return serialize(replace(container, meshes=()))
+
+
 def test_serialize_inverts_parse(data, container):
     assert serialize(container) == data
 
 
 def test_layers_come_before_networks_before_textures(data):
     types = [c.type for c in read(data)]
-    assert types == ["HEAD", *["LAYR"] * 3, "NETW", *["TEXR"] * 3, "iNFO", "TAIL"]
+    order = ["HEAD", "LAYR", "MESH", "POSE", "NETW", "TEXR", "iNFO", "TAIL"]
+    assert types == sorted(types, key=order.index)
+    assert [types.count(t) for t in order] == [1, 3, 3, 0, 1, 3, 1, 1]
 
 
 def test_unknown_ancillary_chunks_survive_and_critical_ones_are_refused(data):
@@ -59,8 +68,8 @@ def test_metadata_bombs_are_refused(container):
         parse(write([*chunks[:-1], Chunk("iCCp", lying), chunks[-1]]))
 
 
-def order(*indices):
-    return lambda chunks: [chunks[i] for i in indices]
+def tree_chunk(groups, parents):
+    return Chunk(tree.TYPE, pack(tree.FIELDS, {"groups": groups, "parents": parents}))
 
 
 @pytest.mark.parametrize(
@@ -76,11 +85,16 @@ def order(*indices):
         (lambda c: [*c[:-1], c[-2], c[-1]], "twice"),
         (lambda c: [*c[:-1], Chunk("TAIL", b"x")], "empty"),
         (lambda c: [*c[:-2], c[-2], c[-3], c[-1]], "out of order"),
+        (
+            lambda c: [*c[:-2], tree_chunk([], [0, 0, 0]), tree_chunk([], [0, 0, 0]), *c[-2:]],
+            "twice",
+        ),
+        (lambda c: [*c[:5], tree_chunk([], [0, 0, 0]), *c[5:]], "out of order"),
     ],
 )
-def test_structure_is_checked(data, change, message):
+def test_structure_is_checked(plain, change, message):
     with pytest.raises(FormatError, match=message):
-        parse(write(change(read(data))))
+        parse(write(change(read(plain))))
 
 
 @pytest.mark.parametrize(
@@ -88,10 +102,13 @@ def test_structure_is_checked(data, change, message):
     [
         ("head", "depth", 9, FormatError),
         ("head", "opaque", 0, None),
-        ("head", "channels", 4, FormatError),
+        ("head", "channels", 4, None),
         ("layers", "box", [0, 0, 0, 5], FormatError),
-        ("layers", "sampling", 1, UnsupportedError),
+        ("layers", "sampling", 3, None),
+        ("layers", "sampling", 4, UnsupportedError),
         ("textures", "coder", 2, UnsupportedError),
+        ("textures", "coder", 200, UnsupportedError),
+        ("meshes", "layer", 1, FormatError),
         ("textures", "network", 1, FormatError),
         ("networks", "channels", 4, FormatError),
     ],
@@ -107,7 +124,7 @@ def test_values_must_agree(container, part, key, value, error):
         parse(changed)
 
 
-@pytest.mark.parametrize("name", ["side", "layers", "segments", "codes", "parameters"])
+@pytest.mark.parametrize("name", ["side", "layers", "segments", "gates", "codes", "parameters"])
 def test_limits_hold(data, name):
     with pytest.raises(LimitError, match=name):
         parse(data, Limits(**{name: 0}))

@@ -180,6 +180,13 @@ def test_a_stack_is_a_partition(masks, support):
     assert len({r.name for r in stack}) == len(stack)
 
 
+def test_numbers_that_order_files_are_no_part_of_names(tmp_path):
+    for name in ("2 cat", "10_dog", "1-sky", "7", "3 "):
+        save(tmp_path / f"{name}.png", box(0, 0, 4, 8) * np.uint8(255))
+    names = [r.name for r in load_masks(tmp_path, 8, 6)]
+    assert names == ["sky", "cat", "3 ", "7", "dog"]
+
+
 def test_names_are_numbered_without_taking_given_ones():
     assert unique_names(["cat", "cat", "dog", "cat"]) == ["cat", "cat 2", "dog", "cat 3"]
     assert unique_names(["cat", "cat", "cat 2"]) == ["cat", "cat 3", "cat 2"]

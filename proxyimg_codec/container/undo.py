@@ -1,0 +1,121 @@
+"""uNDO: earlier states of an edited picture, bound by hash to the present one.
+
+Chunks that a state shares with the present one are referred to; all others are kept once, together.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import msgpack
+
+from ..errors import FormatError
+from ..limits import DEFAULT_LIMITS, Limits
+from . import meta
+from .chunks import Chunk, write
+from .fields import Field, pack, unpack
+
+TYPE = "uNDO"
+
+FIELDS = (
+    Field("state", "bin", "SHA-256 of the file with neither this chunk nor TAIL.", 32, 32),
+    Field("size", "int", "Bytes of the history.", 1),
+    Field("zstd", "bin", "The history as one zstd frame."),
+)
+
+STEPS_MAX = 1 << 12
+"""Most steps that a file keeps; earlier ones are forgotten."""
+
+SIZE_MAX, CHUNKS_MAX = DEFAULT_LIMITS.metadata_bytes - 64, DEFAULT_LIMITS.chunks
+"""Most bytes and chunks of a history that readers accept; earlier steps are forgotten."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """One edit.
+
+    Attributes:
+        operation: What was done, as JSON.
+        chunks: The state before it: all chunks of its file but uNDO and TAIL.
+    """
+
+    operation: str
+    chunks: tuple[Chunk, ...]
+
+
+def encode(present: Sequence[Chunk], steps: Sequence[Step]) -> Chunk:
+    """The chunk for a state and the steps that led to it."""
+    number: dict[tuple[str, bytes], int] = {}
+    for i, chunk in enumerate(present):
+        number.setdefault((chunk.type, chunk.payload), i)
+    kept: list[list[Any]] = []
+    states: list[list[Any]] = []
+    size = 0
+    for step in reversed(steps[-STEPS_MAX:]):
+        keys = [(chunk.type, chunk.payload) for chunk in step.chunks]
+        fresh = [key for key in dict.fromkeys(keys) if key not in number]
+        size += 4 * len(step.operation) + 6 * len(keys) + sum(len(p) + 16 for _, p in fresh) + 16
+        if size > SIZE_MAX or len(present) + len(kept) + len(fresh) > CHUNKS_MAX:
+            break
+        for key in fresh:
+            number[key] = len(present) + len(kept)
+            kept.append(list(key))
+        states.insert(0, [step.operation, [number[key] for key in keys]])
+    history = msgpack.packb({"chunks": kept, "steps": states}, use_bin_type=True)
+    values = {"state": digest(present), "size": len(history), "zstd": meta.compressed(history)}
+    return Chunk(TYPE, pack(FIELDS, values))
+
+
+def decode(
+    payload: bytes, present: Sequence[Chunk], where: str, limits: Limits
+) -> tuple[Step, ...]:
+    """Inverse of `encode`; nothing if the history belongs to another state.
+
+    Raises:
+        FormatError: The history is corrupt.
+        LimitError: It is larger than `limits.metadata_bytes`.
+    """
+    values = unpack(FIELDS, payload, where)
+    if values["state"] != digest(present):
+        return ()
+    history = meta.decompressed(values["size"], values["zstd"], where, limits)
+    try:
+        content = msgpack.unpackb(
+            history, raw=False, strict_map_key=True, max_ext_len=0, max_array_len=1 << 20
+        )
+        kept, steps = content["chunks"], content["steps"]
+        if list(content) != ["chunks", "steps"] or len(steps) > STEPS_MAX:
+            raise ValueError
+        limits.check("chunks", len(present) + len(kept))
+        pool = [*present, *(_chunk(type_, payload) for type_, payload in kept)]
+        result = tuple(_step(operation, references, pool) for operation, references in steps)
+        if msgpack.packb(content, use_bin_type=True) != history:
+            raise ValueError
+    except (
+        ValueError, TypeError, KeyError, IndexError, RecursionError, msgpack.UnpackException,
+    ) as error:  # fmt: skip
+        raise FormatError(f"the history is corrupt ({type(error).__name__})", where) from None
+    return result
+
+
+def digest(chunks: Sequence[Chunk]) -> bytes:
+    """What binds a history to the state it leads to."""
+    return hashlib.sha256(write(chunks)).digest()
+
+
+def _chunk(type_: Any, payload: Any) -> Chunk:
+    named = isinstance(type_, str) and len(type_) == 4 and type_.isascii() and type_.isalpha()
+    if not named or not isinstance(payload, bytes):
+        raise ValueError
+    return Chunk(type_, payload)
+
+
+def _step(operation: Any, references: Any, pool: Sequence[Chunk]) -> Step:
+    if not isinstance(operation, str) or not isinstance(references, list):
+        raise ValueError
+    if any(type(r) is not int or not 0 <= r < len(pool) for r in references):
+        raise ValueError
+    return Step(operation, tuple(pool[r] for r in references))

@@ -1,0 +1,278 @@
+"""Free deformation of a triangle mesh by dragging a few points of it.
+
+As rigid as possible (Sorkine & Alexa 2007, "As-rigid-as-possible surface modeling"), with one
+rotation a triangle (Liu et al. 2008, "A local/global approach to mesh parameterization"). The plane
+is that of the complex numbers: a point is z = x + iy, a rotation is a unit number r. Over the three
+edges d of every rest triangle, with weights w, the energy
+
+    E(z, r) = sum w |d' - r d|^2,    C z = targets
+
+is lowered in turn over r (closed form: the direction of sum w conj(d) d') and over z (one linear
+system, factored once). Row h of C holds the barycentric weights of handle h. The main constants
+are measured in docs/decisions/005-deformation.md.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import UsageError
+from .solver import BlockTridiagonal
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Index = NDArray[np.int64]
+
+COTANGENT = (0.05, 10.0)  # clamp of edge weights: obtuse and sliver triangles stay harmless
+STEPS = 150  # of the alternation, at most
+STRIDE, MOMENTUM = 1.5, 0.6  # of one step (heavy ball): about a third of the plain steps
+STILL = 1e-5  # movement in a step at which it has converged, in extents of the mesh
+ROUNDS, ROUND_STEPS = 32, 10  # of stiffening, at most
+OPPOSITE = np.array([[0, 2, 1], [2, 0, 0], [1, 0, 0]])  # corner opposite to the edge of two others
+FOLDING, SQUEEZED = 0.02, 0.25  # signed least stretch that starts stiffening; that is stiffened
+
+
+def drag(
+    nodes: Real,
+    triangles: NDArray[np.int32],
+    points: Real,
+    targets: Real,
+    rest: Real | None = None,
+) -> Real:
+    """Moves a mesh so that some of its points arrive at their targets and the rest follows.
+
+    Within a connected component: a single handle translates it; several deform it as little as
+    they allow, and those that do not move are pins. A component without a handle keeps its shape
+    and follows its surroundings: it takes the rigid motion that best fits the moved nodes of the
+    other components, near ones counting most. A point outside the mesh holds the nearest point of
+    it, at an unchanged offset. Contradictory targets are met in the sense of least squares.
+
+    Triangles that would fold are made stiffer, step by step, until they do not or no way is found.
+
+    Args:
+        nodes: Present positions in px, float64 [N, 2].
+        triangles: Three node indices each, [T, 3]; any orientation, degenerate ones included.
+        points: Where the handles hold the present mesh, in px, float64 [H, 2].
+        targets: Where the handles shall go, in px, float64 [H, 2].
+        rest: The shape whose local rigidity is kept, in px, float64 [N, 2]; `nodes` by default.
+
+    Returns:
+        New positions in px, float64 [N, 2].
+
+    Raises:
+        UsageError: Shapes do not fit, a number is not finite, a triangle names a node that is not
+            there, or there are handles but no triangles to hold.
+        LimitError: More than `WIDEST` nodes are equally far (in edges) from one end of the mesh,
+            as in a fan of that many triangles; an ordinary mesh of N nodes has some sqrt(N).
+    """
+    rest = nodes if rest is None else rest
+    mesh = _checked(nodes, triangles, points, targets, rest)
+    if not len(points):
+        return np.array(nodes, np.float64)
+    z, z0, p, t = map(_complex, (nodes, rest, points, targets))
+    holders, weights = _attach(z, mesh, p)
+    held = (weights * z[mesh[holders]]).sum(1)
+    t = t - (p - held)
+    component = _components(len(z), mesh)
+    moved = z.copy()
+    grabbed = np.unique(component[mesh[holders, 0]])
+    for c in grabbed:
+        mine = component[mesh[holders, 0]] == c
+        if mine.sum() == 1:
+            moved[component == c] += (t - held)[mine]
+            continue
+        inside = np.flatnonzero(component == c)
+        which = component[mesh[:, 0]] == c
+        local = np.searchsorted(inside, mesh[which])
+        own = np.cumsum(which)[holders[mine]] - 1
+        body = _Body(z0[inside], local, own, weights[mine])
+        start = _rigid(held[mine], t[mine], z[inside])
+        moved[inside] = _settle(body, start, t[mine])
+    _follow(z, moved, component, grabbed)
+    return _columns(moved)
+
+
+def _checked(
+    nodes: Real, triangles: NDArray[np.int32], points: Real, targets: Real, rest: Real
+) -> Index:
+    """The triangles as int64 [T, 3], if everything fits together."""
+    arrays = {"nodes": nodes, "points": points, "targets": targets, "rest": rest}
+    for name, values in arrays.items():
+        if values.ndim != 2 or values.shape[1] != 2:
+            raise UsageError(f"{name}: shape {values.shape}, expected two columns, x and y")
+        if not np.isfinite(values).all():
+            raise UsageError(f"{name}: not all numbers are finite; pass positions in px")
+    if len(points) != len(targets):
+        raise UsageError(f"{len(points)} points but {len(targets)} targets; pass one for each")
+    if len(nodes) != len(rest):
+        raise UsageError(f"{len(nodes)} nodes but {len(rest)} in rest; pass the same mesh")
+    if triangles.ndim != 2 or triangles.shape[1] != 3:
+        raise UsageError(f"triangles: shape {triangles.shape}, expected three columns")
+    if len(points) and not len(triangles):
+        raise UsageError("the mesh has no triangles, so there is nothing to hold")
+    if len(triangles) and not 0 <= triangles.min() <= triangles.max() < len(nodes):
+        raise UsageError(f"triangles: an index is outside 0 .. {len(nodes) - 1}")
+    return triangles.astype(np.int64)
+
+
+def _attach(z: Complex, triangles: Index, points: Complex) -> tuple[Index, Real]:
+    """The triangle nearest to each point [H], and its barycentric weights there [H, 3]."""
+    corner = z[triangles]
+    edge = np.roll(corner, -2, 1) - np.roll(corner, -1, 1)  # opposite to each corner
+    double_area = _cross(edge[:, 0], edge[:, 1])
+    solid = np.abs(double_area) > 1e-9 * (np.abs(edge) ** 2).max(1)
+    double_area = np.where(solid, double_area, 1.0)[:, None]
+    length = np.maximum(np.abs(edge) ** 2, 1e-300)
+    holders, weights = np.empty(len(points), np.int64), np.empty((len(points), 3))
+    for h, point in enumerate(points):
+        from_start = point - np.roll(corner, -1, 1)
+        bary = _cross(edge, from_start) / double_area
+        within = solid & (bary.min(1) >= 0)
+        if within.any():
+            holders[h] = k = int(within.argmax())
+            weights[h] = bary[k]
+            continue
+        along = np.clip((np.conj(edge) * from_start).real / length, 0, 1)
+        gap = np.abs(from_start - along * edge)
+        k, side = divmod(int(gap.argmin()), 3)
+        holders[h] = k
+        weights[h, [side, (side + 1) % 3, (side + 2) % 3]] = 0, 1 - along[k, side], along[k, side]
+    return holders, weights
+
+
+def _complex(points: Real) -> Complex:
+    """Points [N, 2] as complex numbers x + iy [N]."""
+    return np.asarray(points @ np.array([1, 1j]))
+
+
+def _columns(z: Complex) -> Real:
+    """Complex numbers x + iy [N] as points [N, 2]."""
+    return np.stack([z.real, z.imag], 1)
+
+
+def _cross(u: Complex, v: Complex) -> Real:
+    """The z component of the cross product."""
+    return (np.conj(u) * v).imag
+
+
+def _components(count: int, triangles: Index) -> Index:
+    """For each node the lowest node that triangles connect it to, [N]."""
+    label = np.arange(count)
+    while True:
+        low = label.copy()
+        np.minimum.at(low, triangles, label[triangles].min(1)[:, None])
+        low = low[low]
+        if (low == label).all():
+            return label
+        label = low
+
+
+def _rigid(before: Complex, after: Complex, z: Complex, weights: Real | None = None) -> Complex:
+    """`z` under the rigid motion that best maps `before` to `after` (least squares)."""
+    centre, goal = (np.average(v, weights=weights) for v in (before, after))
+    turn = np.average(np.conj(before - centre) * (after - goal), weights=weights)
+    size = np.average(np.abs(before - centre) ** 2, weights=weights)
+    return goal + (turn / abs(turn) if abs(turn) > 1e-9 * size else 1) * (z - centre)
+
+
+def _follow(z: Complex, moved: Complex, component: Index, grabbed: Index) -> None:
+    """Moves the components without a handle, in place (moving least squares, Schaefer 2006)."""
+    leads = np.isin(component, grabbed)
+    for c in np.setdiff1d(component, grabbed):
+        own = component == c
+        distance = np.abs(z[leads] - z[own].mean())
+        weights = 1 / (distance**2 + 1) ** 2
+        moved[own] = _rigid(z[leads], moved[leads], z[own], weights)
+
+
+class _Body:
+    """One connected component, its handles, and the linear system of the global step."""
+
+    def __init__(self, rest: Complex, triangles: Index, holders: Index, weights: Real) -> None:
+        self.triangles, self.count = triangles, len(rest)
+        self.start, self.end = np.roll(triangles, -1, 1), np.roll(triangles, -2, 1)
+        self.edge = rest[self.end] - rest[self.start]  # opposite to each corner [T, 3]
+        self.extent = float(np.abs(rest - rest.mean()).max())
+        corner = -np.conj(np.roll(self.edge, -1, 1)) * np.roll(self.edge, -2, 1)
+        self.double_area = _cross(self.edge[:, 0], self.edge[:, 1])
+        self.solid = np.abs(self.double_area) > 1e-6 * (np.abs(self.edge) ** 2).max(1)
+        cotangents = corner.real / np.maximum(np.abs(corner.imag), 1e-300)
+        self.cotangent = np.clip(cotangents, *COTANGENT)
+        self.rows = np.zeros((len(holders), self.count))
+        np.add.at(self.rows, (np.arange(len(holders))[:, None], triangles[holders]), weights)
+        # The handles' own terms make the matrix definite; they vanish where handles are met.
+        self.handles = weights[:, :, None] * weights[:, None, :]
+        self.matrix = BlockTridiagonal(self.count, triangles, triangles[holders])
+        self.stiffen(np.ones(len(triangles)))
+
+    def stiffen(self, factor: Real) -> None:
+        """Weighs each triangle's part of the energy by `factor` [T], and factors the system."""
+        self.weight = w = self.cotangent * factor[:, None]
+        laplacian = -w[:, OPPOSITE] * (1 - np.eye(3))
+        laplacian -= laplacian.sum(2, keepdims=True) * np.eye(3)
+        self.matrix.factor(np.concatenate([laplacian, self.handles]))
+        self.pull = self.matrix.solve(np.ascontiguousarray(self.rows.T))
+        # Two handles at one place make this singular: the pseudo-inverse shares between them.
+        self.force = np.linalg.pinv(self.rows @ self.pull, rcond=1e-10, hermitian=True)
+
+    def turns(self, z: Complex) -> Complex:
+        """The rotation of each triangle that best maps its rest edges to those of `z`, [T, 1]."""
+        turn = (self.weight * np.conj(self.edge) * (z[self.end] - z[self.start])).sum(1)
+        turn[turn == 0] = 1
+        return np.asarray((turn / np.abs(turn))[:, None])
+
+    def load(self, edges: Complex) -> Real:
+        """What the weighted sum of squares of d' - `edges` [T, 3] asks of each node, [N, 2]."""
+        flow = (self.weight * edges).ravel()
+        a, b, n = self.start.ravel(), self.end.ravel(), self.count
+        sums = [np.bincount(b, f, n) - np.bincount(a, f, n) for f in (flow.real, flow.imag)]
+        return np.stack(sums, 1)
+
+    def step(self, z: Complex, targets: Complex) -> Complex:
+        """The best rotations for `z`, then the best positions for those, handles exactly met."""
+        goal = _columns(targets)
+        x = self.matrix.solve(self.load(self.turns(z) * self.edge) + self.rows.T @ goal)
+        x += self.pull @ (self.force @ (goal - self.rows @ x))
+        return _complex(x)
+
+    def least_stretch(self, z: Complex) -> Real:
+        """Smaller singular value of each triangle's map from rest, negative if it is folded [T].
+
+        With the map d' = a d + b conj(d), it is |a| - |b|. Degenerate triangles count as 1.
+        """
+        d0, d1 = self.edge[:, 0], self.edge[:, 1]
+        e = z[self.end[:, :2]] - z[self.start[:, :2]]
+        scale = 2 * np.where(self.solid, self.double_area, 1)
+        a = np.abs(e[:, 1] * np.conj(d0) - e[:, 0] * np.conj(d1))
+        b = np.abs(e[:, 1] * d0 - e[:, 0] * d1)
+        return np.where(self.solid, (a - b) / np.abs(scale), 1.0)
+
+
+def _settle(body: _Body, z: Complex, targets: Complex) -> Complex:
+    """Minimizes from `z`; then stiffens what folds, and keeps the state with the fewest folds."""
+    z = best = _alternate(body, z, targets, STEPS)
+    squeeze = body.least_stretch(z)
+    fewest, factor = np.count_nonzero(squeeze <= 0), np.ones(len(body.triangles))
+    for _ in range(ROUNDS):
+        if squeeze.min() > FOLDING:
+            break
+        factor = np.where(squeeze < SQUEEZED, 2 * factor, factor)
+        body.stiffen(factor)
+        z = _alternate(body, z, targets, ROUND_STEPS)
+        squeeze = body.least_stretch(z)
+        folds = np.count_nonzero(squeeze <= 0)
+        if folds <= fewest:
+            best, fewest = z, folds
+    return best
+
+
+def _alternate(body: _Body, z: Complex, targets: Complex, steps: int) -> Complex:
+    """Local and global steps with momentum until nothing moves, the last one plain."""
+    before = z = body.step(z, targets)
+    for _ in range(steps):
+        ahead = z + STRIDE * (body.step(z, targets) - z) + MOMENTUM * (z - before)
+        before, z = z, ahead
+        if np.abs(z - before).max() <= STILL * body.extent:
+            break
+    return body.step(z, targets)

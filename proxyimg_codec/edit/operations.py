@@ -1,0 +1,248 @@
+"""The registry of edit operations, and what all of them share.
+
+An operation is data: a JSON object with the key ``op`` and parameters. Its function takes an image
+and returns another; the original is never changed.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ..container.undo import Step
+from ..errors import UsageError
+from ..geometry.pose import OPACITY_MAX
+from ..image import Image, Layer, Layers
+from ..texture.network import Network
+
+NAME_MAX = 200
+
+
+def _numbers(count: int) -> dict[str, Any]:
+    return {"type": "array", "items": {"type": "number"}, "minItems": count, "maxItems": count}
+
+
+KINDS: dict[str, dict[str, Any]] = {
+    "layer": {"type": ["string", "integer"]},
+    "layers": {"type": "array", "items": {"type": ["string", "integer"]}, "minItems": 1},
+    "number": {"type": "number"},
+    "integer": {"type": "integer"},
+    "place": {"type": ["integer", "string"]},
+    "pair": _numbers(2),
+    "matrix": _numbers(6),
+    "colours": _numbers(12),
+    "handles": {"type": "array", "items": _numbers(4), "minItems": 1},
+    "text": {"type": "string"},
+    "axis": {"enum": ["horizontal", "vertical"]},
+    "fit": {"enum": ["box", "shape"]},
+    "colour": {"type": "string", "pattern": "^#[0-9a-fA-F]{6}$"},
+}
+"""JSON schema of each kind of parameter."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter: its kind, whether it must be given, and a sentence."""
+
+    kind: str
+    needed: bool
+    meaning: str
+
+
+@dataclass(frozen=True)
+class Operation:
+    """One operation: its function, parameters and a sentence."""
+
+    apply: Callable[..., Image]
+    parameters: Mapping[str, Parameter]
+    meaning: str
+
+
+OPERATIONS: dict[str, Operation] = {}
+
+
+def operation(name: str, /, **parameters: str) -> Callable[[Callable[..., Image]], Any]:
+    """Registers a function as operation `name`.
+
+    Each parameter is described by ``kind: sentence``; a kind that ends in ``?`` may be left out.
+    """
+    known = {}
+    for key, text in parameters.items():
+        kind, _, meaning = text.partition(": ")
+        known[key] = Parameter(kind.rstrip("?"), not kind.endswith("?"), meaning)
+
+    def register(function: Callable[..., Image]) -> Callable[..., Image]:
+        OPERATIONS[name] = Operation(function, known, (function.__doc__ or "").splitlines()[0])
+        return function
+
+    return register
+
+
+def run(image: Image, values: Mapping[str, Any]) -> Image:
+    """The image after one operation, which its history then tells.
+
+    Raises:
+        UsageError: The operation is unknown, has wrong parameters, or cannot be done.
+    """
+    name = values.get("op") if isinstance(values, Mapping) else None
+    if not isinstance(name, str) or name not in OPERATIONS:
+        raise UsageError(f"operation {name!r} is unknown; there are {', '.join(OPERATIONS)}")
+    chosen = OPERATIONS[name]
+    given = {k: v for k, v in values.items() if k != "op"}
+    for key in given:
+        if key not in chosen.parameters:
+            known = ", ".join(chosen.parameters)
+            raise UsageError(f"{name}: parameter {key!r} is unknown; there are {known}")
+    for key, parameter in chosen.parameters.items():
+        if key in given and not _fits(given[key], KINDS[parameter.kind]):
+            raise UsageError(f"{name}: {key} is {given[key]!r}; it must be {parameter.meaning}")
+        if key not in given and parameter.needed:
+            raise UsageError(f"{name}: {key} is missing; it must be {parameter.meaning}")
+    result = chosen.apply(image, **given)
+    step = Step(json.dumps({"op": name, **given}, ensure_ascii=False), image.chunks)
+    return replace(result, history=(*image.history, step))
+
+
+def _fits(value: Any, schema: Mapping[str, Any]) -> bool:
+    """Whether a value satisfies the part of JSON schema that `KINDS` uses."""
+    if "enum" in schema:
+        return value in schema["enum"]
+    types = [schema["type"]] if isinstance(schema["type"], str) else schema["type"]
+    if isinstance(value, bool):
+        return False
+    if isinstance(value, str):
+        return "string" in types and re.search(schema.get("pattern", ""), value) is not None
+    if isinstance(value, int):
+        return "integer" in types or "number" in types
+    if isinstance(value, float):
+        return "number" in types and math.isfinite(value)
+    if isinstance(value, (list, tuple)) and "array" in types:
+        low, high = schema.get("minItems", 0), schema.get("maxItems", math.inf)
+        return low <= len(value) <= high and all(_fits(v, schema["items"]) for v in value)
+    return False
+
+
+def one(image: Image, name: str | int) -> Layer:
+    """The layer with a name or at a position.
+
+    Raises:
+        UsageError: There is none, or it is a group.
+    """
+    if isinstance(name, str) and name in image.groups:
+        raise UsageError(f"{name!r} is a group; this works on single layers")
+    layer: Layer = image.layers[name]
+    return layer
+
+
+def members(image: Image, name: str | int) -> list[Layer]:
+    """The layers of a group, or a layer, and all that follow it, back to front.
+
+    Raises:
+        UsageError: There is no such layer or group, or the group is empty.
+    """
+    above = parents(image)
+    root = name if isinstance(name, str) and name in image.groups else one(image, name).name
+
+    def below(node: str | None) -> bool:
+        while node is not None and node != root:
+            node = above[node]
+        return node is not None
+
+    found = [layer for layer in image.layers if below(layer.name)]
+    if not found:
+        raise UsageError(f"group {name!r} has no layers")
+    return found
+
+
+def shown_together(image: Image, name: str | int) -> list[Layer]:
+    """The layers whose look changes together: those of a group, or one layer alone."""
+    group = isinstance(name, str) and name in image.groups
+    return members(image, name) if group else [one(image, name)]
+
+
+def parents(image: Image) -> dict[str, str | None]:
+    """The parent of every layer and group, by name."""
+    return {**{layer.name: layer.parent for layer in image.layers}, **image.groups}
+
+
+def substituted(image: Image, layers: Iterable[Layer]) -> Image:
+    """The image with some layers replaced by others of the same names."""
+    new = {layer.name: layer for layer in layers}
+    return changed(image, [new.get(layer.name, layer) for layer in image.layers])
+
+
+def changed(
+    image: Image,
+    layers: Sequence[Layer],
+    *,
+    groups: Mapping[str, str | None] | None = None,
+    networks: Sequence[Network] | None = None,
+) -> Image:
+    """The image with other layers, groups or networks, and all that follows from them.
+
+    Raises:
+        UsageError: No layer is left.
+    """
+    if not layers:
+        raise UsageError("this would remove the last layer; a picture needs one")
+    kept = list(image.networks if networks is None else networks)
+    used = {layer.texture.network for layer in layers}
+    # Networks that no layer needed before either are none of our business.
+    before = {layer.texture.network for layer in image.layers}
+    while (last := len(kept) - 1) not in used and (last in before or last >= len(image.networks)):
+        kept.pop()
+    return replace(
+        image,
+        layers=Layers(layers),
+        networks=tuple(kept),
+        channels=max(image.channels, *(network.shape.channels for network in kept)),
+        opaque=image.opaque if layers[0] is image.layers[0] else _covers(layers[0], kept),
+        groups=image.groups if groups is None else groups,
+        info=_info(image, layers),
+        extra=tuple(chunk for chunk in image.extra if chunk.safe_to_copy),
+    )
+
+
+def _covers(back: Layer, networks: Sequence[Network]) -> bool:
+    """Whether a back layer covers the whole canvas and lets nothing through."""
+    still = back.boundary is None and not back.pose.affine and back.pose.nodes is None
+    visible = back.pose.opacity == OPACITY_MAX and not back.pose.hidden
+    return still and visible and networks[back.texture.network].shape.channels == 3
+
+
+def _info(image: Image, layers: Sequence[Layer]) -> Mapping[str, Any] | None:
+    """The iNFO with an area for each layer; that of a copy is the original's."""
+    if image.info is None or not image.info["areas"]:
+        return image.info
+    areas = dict(zip((v.texture for v in image.layers), image.info["areas"], strict=True))
+    named = dict(zip((v.name for v in image.layers), image.info["areas"], strict=True))
+    return {
+        **image.info,
+        "areas": [named.get(v.name, areas.get(v.texture, 0)) for v in layers],
+    }
+
+
+def free_name(image: Image, wanted: str) -> str:
+    """`wanted`, or with a number if a layer or group has that name."""
+    taken, name, number = parents(image), wanted, 2
+    while name in taken:
+        name = f"{wanted} {number}"
+        number += 1
+    return name
+
+
+def checked_name(image: Image, name: str) -> str:
+    """A name that is free.
+
+    Raises:
+        UsageError: It is taken, empty, too long, or not printable.
+    """
+    if not 1 <= len(name) <= NAME_MAX or not name.isprintable():
+        raise UsageError(f"name {name!r} must have 1..{NAME_MAX} printable characters")
+    if name in parents(image):
+        raise UsageError(f"there is a layer or group {name!r} already")
+    return name

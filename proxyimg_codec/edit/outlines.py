@@ -1,0 +1,143 @@
+"""Outlines from SVG onto the layers of a picture: what `export.svg` writes, edited by hand."""
+
+from __future__ import annotations
+
+import re
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from .. import markup
+from ..errors import InputError, UnsupportedError
+from ..export.svg import INKSCAPE, identifiers
+from ..geometry.boundary import COORDINATE_MAX, Boundary
+from ..image import Image, Layer
+from ..limits import DEFAULT_LIMITS, Limits
+from .svg_shapes import Points, curves_of, page_of, shapes, tag_of
+
+UNITS = (6, 5, 4)
+"""Units of new boundaries: the finest in which all coordinates are in range."""
+
+EXACT = 0.02
+"""Control points that are this close to multiples of a layer's own unit are such multiples."""
+
+_TOKEN = re.compile(r"[A-DF-Za-df-z]|(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+"""A command or number of path data: a cubic has seven at most."""
+
+
+def load(
+    image: Image, data: bytes, name: str = "the SVG", limits: Limits = DEFAULT_LIMITS
+) -> dict[str, Boundary]:
+    """The outlines in an SVG file, by the layer that each belongs to.
+
+    The page is the canvas. A shape belongs to the layer that its Inkscape label, id or title names.
+    Transforms are applied, open paths closed, lines, quadratics and arcs become cubics. Coordinates
+    keep the unit of a layer at rest where they are multiples of it, so that an unchanged file gives
+    identical control points. Passed over are a layer that covers the whole canvas, and an unchanged
+    outline of a layer that is not at rest, whose unit no file can hold.
+
+    Args:
+        image: The picture; where its layers stand at present is the canvas of the file.
+        data: The SVG file.
+        name: What messages call it.
+        limits: Bounds the number of segments.
+
+    Raises:
+        InputError: Not SVG, a shape that belongs to no layer or cannot be a boundary, or nothing
+            that belongs to any.
+        UnsupportedError: The file has clones, nested documents or even-odd filled holes.
+        LimitError: Too large.
+    """
+    root = markup.parse(data, name)
+    if tag_of(root) != "svg":
+        raise InputError(f"{name}: not an SVG file, its root element is {root.tag[:80]!r}")
+    drawn = [e.get(key, "") for e in root.iter() for key in ("d", "points")]
+    limits.check("segments", sum(1 for text in drawn for _ in _TOKEN.finditer(text)) // 7)
+    page, size = page_of(root, image, name)
+    found: dict[str, Boundary | None] = {}
+    for element, matrix in shapes(root, page, name):
+        layer = _layer_of(element, image, name)
+        where = f"{name}: layer {layer.name!r}"
+        if layer.name in found:
+            raise InputError(f"{where}: two shapes have its name; combine them into one path")
+        curves = curves_of(element, size, where)
+        with np.errstate(all="ignore"):  # what overflows is refused below
+            curves = [c @ matrix[:2, :2].T + matrix[:2, 2] for c in curves]
+        if len(curves) > 1 and _fill_rule(element) == "evenodd":
+            raise UnsupportedError(
+                f"{where}: fill-rule evenodd is not supported; set it to nonzero and make its "
+                "holes run the other way (in Inkscape: Path > Union)"
+            )
+        found[layer.name] = _boundary(curves, layer, image, where)
+        segments = sum(sum(b.segments) for b in found.values() if b is not None)
+        limits.check("segments", segments)
+    if not found:
+        raise InputError(f"{name}: there is no path, so no outline of any layer")
+    return {layer: boundary for layer, boundary in found.items() if boundary is not None}
+
+
+def _fill_rule(element: Element) -> str:
+    styled = re.search(r"fill-rule\s*:\s*(\w+)", element.get("style", ""))
+    return styled[1] if styled else element.get("fill-rule", "nonzero")
+
+
+def _layer_of(element: Element, image: Image, name: str) -> Layer:
+    """The layer that a shape's label, id or title names."""
+    names = [layer.name for layer in image.layers]
+    by_id = dict(zip(identifiers(names), image.layers, strict=True))
+    by_name = {markup.text(layer.name): layer for layer in image.layers}
+    title = next((child.text or "" for child in element if tag_of(child) == "title"), "")
+    label, id_ = element.get(f"{{{INKSCAPE}}}label", ""), element.get("id", "")
+    for layer in (by_name.get(label), by_id.get(id_), by_name.get(id_), by_name.get(title)):
+        if layer is not None:
+            return layer
+    raise InputError(
+        f"{name}: {tag_of(element)} {label or id_ or title!r} has the name of no layer; delete it, "
+        f"or label it with one of {', '.join(map(repr, names))}"
+    )
+
+
+def _boundary(curves: list[Points], layer: Layer, image: Image, where: str) -> Boundary | None:
+    """Curves on the canvas as a boundary; None for what `load` passes over."""
+    points = np.concatenate(curves) if curves else np.zeros((0, 2))
+    if not np.isfinite(points).all():
+        raise InputError(f"{where}: a coordinate is not a finite number")
+    present = layer.outline
+    most = float(np.abs(points).max(initial=0))
+    units = [u for u in UNITS if most * (1 << u) < COORDINATE_MAX - 0.5]
+    if present is not None and most * (1 << present.unit) < COORDINATE_MAX - 0.5:
+        own = points * (1 << present.unit)
+        if present.unit < UNITS[0] and np.abs(own - np.rint(own)).max(initial=0) < EXACT:
+            units.insert(0, present.unit)
+    if not units:
+        raise InputError(f"{where}: a coordinate of {most:g} pixels is out of range")
+    result = _in_unit(units[0], curves)
+    if not result.paths:
+        raise InputError(f"{where}: its path is empty; draw an outline, or delete it")
+    if present is None:
+        sides = image.width << result.unit, image.height << result.unit
+        corners = {(x, y) for x in (0, sides[0]) for y in (0, sides[1])}
+        if {(int(x), int(y)) for p in result.paths for x, y in p[::3]} == corners:
+            return None
+        if image.opaque and layer is image.layers[0]:
+            raise InputError(f"{where}: the back layer covers the whole canvas and stays so")
+    elif present.unit > UNITS[0] and _same(_in_unit(present.unit, curves), present):
+        return None
+    return result
+
+
+def _in_unit(unit: int, curves: list[Points]) -> Boundary:
+    """The boundary of curves [3 m + 1, 2] on the canvas, closed; single points are left out."""
+    paths = []
+    for curve in curves:
+        path = np.rint(curve * (1 << unit)).astype(np.int64)
+        if (path != path[0]).any():
+            closed = (path[0] == path[-1]).all()
+            paths.append(path[:-1] if closed else np.concatenate([path, path[[-1, 0]]]))
+    return Boundary(unit, tuple(paths))
+
+
+def _same(one: Boundary, other: Boundary) -> bool:
+    return one.segments == other.segments and all(
+        (p == q).all() for p, q in zip(one.paths, other.paths, strict=True)
+    )

@@ -1,0 +1,83 @@
+"""Edit scripts: operations in a JSON file, and the schema that describes them.
+
+`python -m proxyimg_codec.edit.script` prints the schema.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from ..errors import PxiError, UsageError
+from ..image import Image
+from . import geometry, look, structure
+from .operations import KINDS, OPERATIONS, run
+
+__all__ = ["OPERATIONS", "apply", "geometry", "look", "parse", "schema", "structure"]
+
+
+def apply(image: Image, operations: Iterable[Mapping[str, Any]]) -> Image:
+    """The image after all `operations`, in order.
+
+    Raises:
+        UsageError: One of them is unknown or cannot be done; it says which.
+    """
+    for number, values in enumerate(operations, 1):
+        try:
+            image = run(image, values)
+        except PxiError as error:
+            error.args = (f"edit {number}: {error}",)
+            raise
+    return image
+
+
+def parse(text: str, where: str) -> list[Mapping[str, Any]]:
+    """The operations of a script.
+
+    Raises:
+        UsageError: It is not JSON, or not a script.
+    """
+    try:
+        script = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise UsageError(f"{where}: is not valid JSON: {error}") from None
+    if not isinstance(script, dict) or script.get("version") != 1:
+        raise UsageError(f'{where}: must be an object with "version": 1 and a list "edits"')
+    edits = script.get("edits")
+    if not isinstance(edits, list) or set(script) - {"version", "edits", "$schema"}:
+        raise UsageError(f'{where}: must have a list "edits" and nothing else beside "version"')
+    return edits
+
+
+def schema() -> dict[str, Any]:
+    """The JSON schema of scripts."""
+    variants = []
+    for name, operation in OPERATIONS.items():
+        properties: dict[str, Any] = {"op": {"const": name}}
+        for key, parameter in operation.parameters.items():
+            properties[key] = {**KINDS[parameter.kind], "description": parameter.meaning}
+        variants.append(
+            {
+                "description": operation.meaning,
+                "properties": properties,
+                "required": ["op", *(k for k, p in operation.parameters.items() if p.needed)],
+                "additionalProperties": False,
+            }
+        )
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "Edits of a .pxi picture",
+        "type": "object",
+        "properties": {
+            "$schema": {"type": "string"},
+            "version": {"const": 1},
+            "edits": {"type": "array", "items": {"type": "object", "oneOf": variants}},
+        },
+        "required": ["version", "edits"],
+        "additionalProperties": False,
+    }
+
+
+if __name__ == "__main__":
+    print(json.dumps(schema(), indent=2))

@@ -1,0 +1,154 @@
+"""Shapes of an SVG file as cubic curves on the canvas of a picture.
+
+The page (viewBox, otherwise width and height) is the canvas, whatever its unit.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from typing import Any
+from xml.etree.ElementTree import Element
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError, UnsupportedError
+from ..export.svg import NAMESPACE
+from ..image import Image
+
+try:
+    import svgelements
+except ImportError:
+    raise UnsupportedError(
+        "outlines from SVG need svgelements: pip install 'proxyimg-codec[svg]'"
+    ) from None
+
+Points = NDArray[np.float64]
+
+SHAPES = ("path", "rect", "circle", "ellipse", "polygon", "polyline")
+GROUPS = ("g", "a", "switch")
+GEOMETRY = ("x", "y", "width", "height", "rx", "ry", "cx", "cy", "r", "points")
+
+ASPECT = 0.005
+"""How much the page's aspect may differ from the canvas's."""
+
+_MALFORMED = (ValueError, AttributeError, TypeError, IndexError, KeyError, ArithmeticError)
+"""What svgelements raises on data that it cannot make sense of."""
+
+
+def tag_of(element: Element) -> str:
+    """The local name of an SVG element, or an empty one."""
+    namespace, _, local = element.tag.rpartition("}")
+    return local if namespace in ("", "{" + NAMESPACE) else ""
+
+
+def page_of(root: Element, image: Image, name: str) -> tuple[Points, tuple[float, float]]:
+    """The transform [3, 3] from user units to canvas pixels, and the page in user units."""
+    try:
+        if "viewBox" in root.attrib:
+            x, y, width, height = map(float, re.split(r"[\s,]+", root.attrib["viewBox"].strip()))
+        else:
+            x = y = 0.0
+            width, height = (
+                _pixels(root.get(key, "100%"), default)
+                for key, default in (("width", image.width), ("height", image.height))
+            )
+        scale = image.width / width, image.height / height
+        good = all(map(math.isfinite, (x, y, *scale))) and min(scale) > 0
+    except _MALFORMED:
+        good = False
+    if not good:
+        raise InputError(f"{name}: viewBox, width and height make no page")
+    if abs(scale[0] / scale[1] - 1) > ASPECT:
+        raise InputError(
+            f"{name}: the page of {width:g}x{height:g} has another shape than the canvas of "
+            f"{image.width}x{image.height}; set the page back"
+        )
+    matrix = np.diag([*scale, 1.0])
+    matrix[:2, 2] = -scale[0] * x, -scale[1] * y
+    return matrix, (width, height)
+
+
+def _pixels(length: str, whole: int) -> float:
+    """A length in pixels at 96 to the inch; percentages are of the `whole`."""
+    if length.strip().endswith("%"):
+        return float(length.strip()[:-1]) / 100 * whole
+    return float(svgelements.Length(length).value(ppi=96))
+
+
+def shapes(parent: Element, matrix: Points, name: str) -> Iterator[tuple[Element, Points]]:
+    """All shapes that are drawn, and their transforms [3, 3] to the canvas."""
+    for element in parent:
+        tag = tag_of(element)
+        if tag in ("use", "svg"):
+            raise UnsupportedError(
+                f"{name}: element {tag} {element.get('id', '')!r} cannot be an outline; delete it, "
+                "or make it a path (in Inkscape: unlink the clone)"
+            )
+        if tag not in SHAPES and tag not in GROUPS:
+            continue
+        try:
+            m = svgelements.Matrix(element.get("transform", ""))
+            m.render(ppi=96)
+            own = np.array([[m.a, m.c, m.e], [m.b, m.d, m.f], [0, 0, 1]], np.float64)
+            with np.errstate(all="ignore"):  # coordinates that overflow are refused later
+                placed = matrix @ own
+        except _MALFORMED:
+            raise InputError(
+                f"{name}: the transform of {tag} {element.get('id', '')!r} cannot be read"
+            ) from None
+        if tag in GROUPS:
+            yield from shapes(element, placed, name)
+        else:
+            yield element, placed
+
+
+def curves_of(element: Element, size: tuple[float, float], where: str) -> list[Points]:
+    """The cubic curves [3 m + 1, 2] of each part of a shape, in user units, not yet closed."""
+    try:
+        path = _path(element, size)
+        curves: list[list[Any]] = []
+        drawing = False
+        for segment in path:
+            if isinstance(segment, svgelements.Close):
+                drawing = False
+                continue
+            if isinstance(segment, svgelements.Move):
+                curves.append([segment.end])
+                drawing = True
+                continue
+            if not drawing:
+                curves.append([segment.start])
+                drawing = True
+            curves[-1] += _cubics(segment)
+        return [np.array([(p.x, p.y) for p in c], np.float64) for c in curves]
+    except _MALFORMED:
+        raise InputError(f"{where}: its {tag_of(element)} cannot be read; draw it anew") from None
+
+
+def _path(element: Element, size: tuple[float, float]) -> Any:
+    """A shape as a path of svgelements, in user units."""
+    tag = tag_of(element)
+    if tag == "path":
+        return svgelements.Path(element.get("d", ""))
+    attributes = {k: element.attrib[k] for k in GEOMETRY if k in element.attrib}
+    shape = getattr(svgelements, tag.title())(attributes)
+    shape.render(ppi=96, width=size[0], height=size[1])
+    return svgelements.Path(shape)
+
+
+def _cubics(segment: Any) -> list[Any]:
+    """The control points of a segment as cubics, without its start; those of lines are its ends."""
+    a, b = segment.start, segment.end
+    if isinstance(segment, svgelements.CubicBezier):
+        return [segment.control1, segment.control2, b]
+    if isinstance(segment, svgelements.QuadraticBezier):
+        q = segment.control
+        return [a + (q - a) * (2 / 3), b + (q - b) * (2 / 3), b]
+    if isinstance(segment, svgelements.Arc):
+        curves = list(segment.as_cubic_curves())
+        if curves:
+            return [p for c in curves for p in (c.control1, c.control2, c.end)]
+    return [a, b, b]

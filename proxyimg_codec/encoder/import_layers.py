@@ -1,0 +1,211 @@
+"""From a layered picture to an `Image`: every layer becomes one of its own.
+
+Other than from a flat picture, a layer's texture is learnt from all of its own pixels, also those
+that others hide.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import cv2
+import numpy as np
+
+from ..errors import InputError
+from ..geometry.pose import OPACITY_MAX, Pose
+from ..image import Image, Layers
+from ..limits import DEFAULT_LIMITS
+from ..texture.network import Floats, NetShape
+from .encode import Progress, check_blocks, fit_image, to_float
+from .layers import LayerPlan, Plan, plan_layers
+from .masks import unique_names
+from .meshes import with_meshes
+from .openraster import LayeredPicture, SourceLayer
+from .problem import Problem, build_apart
+from .settings import Settings
+
+MARGIN = 8
+"""Pixels around a layer's own that its outline is fitted with."""
+
+SURE = 0.5
+"""Where a layer with crisp outlines has this much alpha, its colour is its own."""
+
+
+def encode_layers(
+    picture: LayeredPicture, settings: Settings | None = None, progress: Progress | None = None
+) -> tuple[Image, LayeredPicture]:
+    """Encodes a layered picture, layer by layer.
+
+    Args:
+        picture: What `read_openraster` gives, or made by hand; blocks are carried. Opacity,
+            visibility and groups of layers become those of the image's.
+        settings: What is asked for; those of the decomposition do not apply.
+        progress: Called as work goes on.
+
+    Returns:
+        The picture as it will be decoded, and the source with those layers only that it has: some
+        may have too few or too faint pixels to be found.
+
+    Raises:
+        InputError: No layer is left.
+        LimitError: The canvas is too large.
+    """
+    settings = settings or Settings()
+    report = progress or (lambda stage, done, total: None)
+    DEFAULT_LIMITS.check("side", max(picture.width, picture.height))
+    check_blocks(picture.blocks)
+    sources: list[SourceLayer] = []
+    plans: list[Plan] = []
+    left_out = list(picture.left_out)
+    for k, source in enumerate(picture.layers):
+        report("layers", k, len(picture.layers))
+        plan = _plan(source, picture, settings)
+        if plan.layers[0].boundary is None and not plan.opaque:
+            left_out.append(source.name)
+        else:
+            sources.append(source)
+            plans.append(plan)
+    if not sources:
+        raise InputError("all layers are empty, or too faint to be seen")
+    picture = replace(picture, layers=tuple(sources), left_out=tuple(left_out))
+    visible = composite(picture)
+    visible[..., :3] *= visible[..., 3:]
+    whole = Plan(tuple(p.layers[0] for p in plans), 4, False)
+    meshed = with_meshes(visible, whole, settings).layers
+    # A network without alpha leaves what is opaque exactly so: one for crisp layers, one for soft.
+    parts = []
+    for channels in (3, 4):
+        which = [k for k, plan in enumerate(plans) if plan.channels == channels]
+        if which:
+            some = replace(picture, layers=tuple(sources[k] for k in which))
+            plan = Plan(tuple(meshed[k] for k in which), channels, False)
+            parts.append(_fitted(some, plan, settings, report))
+    covered = plans[0].opaque and not sources[0].hidden and sources[0].opacity == 1
+    return _merged(parts, picture, covered), picture
+
+
+def _fitted(
+    picture: LayeredPicture,
+    plan: Plan,
+    settings: Settings,
+    report: Callable[[str, int, int], None],
+) -> Image:
+    """The layers of `picture` as those of an image with one network."""
+    size = (picture.width, picture.height)
+
+    def picture_of(k: int) -> Floats:
+        return _clean(_on_canvas(picture.layers[k], (0, 0, *size)), plan.channels == 4)
+
+    def problem_of(shape: NetShape, spacing: float) -> Problem:
+        return build_apart(picture_of, [v.boundary for v in plan.layers], shape, spacing, size)
+
+    pixels = sum(math.prod(source.pixels.shape[:2]) for source in picture.layers)
+    return fit_image(problem_of, pixels, plan, size, settings, report)
+
+
+def _merged(parts: Sequence[Image], picture: LayeredPicture, opaque: bool) -> Image:
+    """One image of parts that share the layers of `picture`, with their poses and groups."""
+    sources = picture.layers
+    paths = {s.groups[: i + 1]: "" for s in sources for i in range(len(s.groups))}
+    names = unique_names([*(s.name for s in sources), *(path[-1] for path in paths)])
+    paths = dict(zip(paths, names[len(sources) :], strict=True))
+    fitted = {
+        layer.name: replace(layer, texture=replace(layer.texture, network=i))
+        for i, part in enumerate(parts)
+        for layer in part.layers
+    }
+    layers = [
+        replace(
+            fitted[s.name],
+            pose=Pose(opacity=round(s.opacity * OPACITY_MAX), hidden=s.hidden),
+            parent=paths.get(s.groups),
+        )
+        for s in sources
+    ]
+    return replace(
+        parts[0],
+        channels=max(part.channels for part in parts),
+        opaque=opaque,
+        depth=16 if any(s.pixels.dtype == np.uint16 for s in sources) else 8,
+        layers=Layers(layers),
+        networks=tuple(network for part in parts for network in part.networks),
+        blocks=dict(picture.blocks),
+        info={**(parts[0].info or {}), "areas": _areas(picture)},
+        groups={name: paths.get(path[:-1]) for path, name in paths.items()},
+    )
+
+
+def _areas(picture: LayeredPicture) -> list[int]:
+    """Visible pixels of each layer."""
+    clear = np.ones((picture.height, picture.width), np.float32)
+    areas = []
+    for layer in reversed(picture.layers):
+        alpha = to_float(layer.pixels)[0][..., 3] * np.float32(layer.opacity * (not layer.hidden))
+        height, width = alpha.shape
+        below = clear[layer.y : layer.y + height, layer.x : layer.x + width]
+        areas.append(round(float((alpha * below).sum(dtype=np.float64))))
+        below *= 1 - alpha
+    return areas[::-1]
+
+
+def composite(picture: LayeredPicture) -> Floats:
+    """The layers with their opacities over each other: [H, W, 4], straight alpha in 0..1."""
+    result = np.zeros((picture.height, picture.width, 4), np.float32)
+    for layer in picture.layers:
+        if layer.hidden:
+            continue
+        source = to_float(layer.pixels)[0]
+        height, width = source.shape[:2]
+        alpha = source[..., 3:] * np.float32(layer.opacity)
+        below = result[layer.y : layer.y + height, layer.x : layer.x + width]
+        below *= 1 - alpha
+        below[..., :3] += source[..., :3] * alpha
+        below[..., 3:] += alpha
+    result[..., :3] /= np.maximum(result[..., 3:], np.float32(1e-6))
+    return np.clip(result, 0, 1)
+
+
+def _plan(layer: SourceLayer, picture: LayeredPicture, settings: Settings) -> Plan:
+    """The plan of one layer as a picture of its own, in canvas coordinates."""
+    height, width = layer.pixels.shape[:2]
+    x0, y0 = max(layer.x - MARGIN, 0), max(layer.y - MARGIN, 0)
+    x1 = min(layer.x + width + MARGIN, picture.width)
+    y1 = min(layer.y + height + MARGIN, picture.height)
+    alone = _on_canvas(layer, (x0, y0, x1 - x0, y1 - y0))
+    plan = plan_layers(alone, replace(settings, max_layers=1), None)
+    outline = plan.layers[0].boundary
+    if outline is None:
+        return replace(plan, layers=(LayerPlan(layer.name, None),))
+    moved = tuple(p + np.array([x0, y0]) * (1 << outline.unit) for p in outline.paths)
+    return replace(plan, layers=(LayerPlan(layer.name, replace(outline, paths=moved)),))
+
+
+def _on_canvas(layer: SourceLayer, region: tuple[int, int, int, int]) -> Floats:
+    """The layer alone on a part of the canvas: [h, w, 4], straight alpha in 0..1."""
+    x, y, width, height = region
+    canvas = np.zeros((height, width, 4), np.float32)
+    source = to_float(layer.pixels)[0]
+    row, column = layer.y - y, layer.x - x
+    canvas[row : row + source.shape[0], column : column + source.shape[1]] = source
+    return canvas
+
+
+def _clean(picture: Floats, soft: bool) -> Floats:
+    """`picture` with colours that go on beyond its rim; alpha is 1 unless the layer is `soft`.
+
+    The outline draws the rim, and under it the texture must be that of the inside: pixels that are
+    little covered, or not at all, take the colour of the nearest one that is.
+    """
+    alpha = picture[..., 3]
+    sure = alpha > 0 if soft else alpha >= SURE
+    _, nearest = cv2.distanceTransformWithLabels(
+        (~sure).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    colours = np.zeros((int(nearest.max()) + 1, 3), np.float32)
+    colours[nearest[sure]] = picture[sure][:, :3]
+    picture[..., :3] = colours[nearest]
+    if not soft:
+        picture[..., 3] = 1
+    return picture

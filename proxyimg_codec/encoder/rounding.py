@@ -1,0 +1,178 @@
+"""Quantization of a trained model by block reconstruction: which values round up, which down.
+
+BRECQ (Li et al. 2021): block after block, with the inputs that the quantized blocks before give, so
+that the outputs of each come near those of the float model on a few calibration points; an error
+counts by how much it changes the colour. AdaRound (Nagel et al. 2020): the choice between the two
+neighbouring integers is a sigmoid that is driven to 0 or 1. The target colours are not looked at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .fit import Progress
+from .fit_torch import run_network
+
+BATCH = 1 << 10
+"""Calibration points a step."""
+
+RATE, BIAS_RATE = 2e-2, 1e-3
+"""Learning rates of the choices and of biases."""
+
+STRETCH = 0.1
+"""The sigmoid is stretched by that much on either side, so that it reaches 0 and 1 (AdaRound)."""
+
+WARM_UP, SHARP, WEIGHT = 0.2, (20.0, 2.0), 1e-2
+"""Share of steps before choices are driven, first and last exponent and weight of the drive."""
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """Float tensors of a model.
+
+    Attributes:
+        codes: [rows, D].
+        code_steps: Quantization steps, of the shape of `codes`.
+        net: Weights [out, in] and biases [out] of each linear layer in turn.
+        row_steps: For each linear layer steps [out, 1].
+        octaves: Octaves of the frequency encoding.
+    """
+
+    codes: Any
+    code_steps: Any
+    net: list[Any]
+    row_steps: list[Any]
+    octaves: int
+
+    @property
+    def blocks(self) -> list[tuple[int, int]]:
+        """First and last + 1 linear layer of each block; the first includes the codes."""
+        layers = len(self.row_steps)
+        return [(0, 1), *((k, min(k + 2, layers)) for k in range(1, layers, 2))]
+
+    def activate(self, x: Any, net: list[Any], start: int, stop: int) -> Any:
+        """Outputs of layers `start` to `stop` - 1, whose parameters are `net`."""
+        import torch
+
+        y = run_network(x, net, 0 if start else self.octaves)
+        return torch.relu(y) if stop < len(self.row_steps) else y
+
+
+class Choice:
+    """Values that are one of two neighbouring multiples of a step."""
+
+    def __init__(self, values: Any, steps: Any, bits: int) -> None:
+        import torch
+
+        top = (1 << (bits - 1)) - 1
+        self._range, self._steps = (-top - 1, top), steps
+        self._floor = torch.floor(values / steps)
+        share = (values / steps - self._floor).clamp(0.01, 0.99)
+        self.logit = torch.logit((share + STRETCH) / (1 + 2 * STRETCH)).requires_grad_()
+
+    def _share(self) -> Any:
+        return (self.logit.sigmoid() * (1 + 2 * STRETCH) - STRETCH).clamp(0, 1)
+
+    def soft(self) -> Any:
+        """Values while choices are open."""
+        return (self._floor + self._share()).clamp(*self._range) * self._steps
+
+    def hard(self) -> Any:
+        """Values as they will be stored."""
+        chosen = self._floor + (self.logit.detach() > 0)
+        return chosen.clamp(*self._range) * self._steps
+
+    def drive(self, sharp: float) -> Any:
+        """How open the choices are."""
+        return (1 - (2 * self._share() - 1).abs() ** sharp).sum()
+
+
+def reconstruct(
+    model: Model,
+    features: Callable[[Any, Any], Any],
+    count: int,
+    bits: tuple[int, int],
+    steps: int,
+    seed: int,
+    progress: Progress | None = None,
+) -> tuple[Any, list[Any]]:
+    """Rounded codes and network: codes and weights are multiples of their steps.
+
+    Args:
+        model: The float model.
+        features: Features of calibration points, from codes and the indices of the points.
+        count: Number of calibration points.
+        bits: Bits a code and a weight.
+        steps: Optimizer steps, shared by the blocks.
+        seed: Of the batches.
+        progress: Told how many steps were done.
+    """
+    import torch
+
+    rng = np.random.default_rng([seed, 1])
+    every = torch.arange(count, device=model.codes.device)
+    outputs, importance = _outputs(model, features(model.codes, every).detach())
+    codes, net = model.codes, list(model.net)
+    hidden: Any = None
+    for number, (start, stop) in enumerate(model.blocks):
+        choices = [Choice(net[2 * k], model.row_steps[k], bits[1]) for k in range(start, stop)]
+        biases = [net[2 * k + 1].clone().requires_grad_() for k in range(start, stop)]
+        if start == 0:
+            choices.append(Choice(codes, model.code_steps, bits[0]))
+        adam = torch.optim.Adam(
+            [
+                {"params": [c.logit for c in choices], "lr": RATE},
+                {"params": biases, "lr": BIAS_RATE},
+            ]
+        )
+        count_here = steps * (number + 1) // len(model.blocks) - steps * number // len(model.blocks)
+        for i in range(count_here):
+            at = torch.from_numpy(rng.integers(count, size=BATCH)).to(every.device)
+            values = [c.soft() for c in choices]
+            x = hidden[at] if start else features(values.pop(), at)
+            part = [p for pair in zip(values, biases, strict=True) for p in pair]
+            off = model.activate(x, part, start, stop) - outputs[number][at]
+            loss = (off**2 * importance[number][at]).sum(1).mean()
+            t = (i / count_here - WARM_UP) / (1 - WARM_UP)
+            if t > 0:
+                sharp = SHARP[0] + (SHARP[1] - SHARP[0]) * t
+                loss = loss + WEIGHT * sum(c.drive(sharp) for c in choices)
+            adam.zero_grad()
+            loss.backward()
+            adam.step()
+            if progress:
+                progress(1)
+        values = [c.hard() for c in choices]
+        if start == 0:
+            codes = values.pop()
+            hidden = features(codes, every)
+        net[2 * start : 2 * stop] = [
+            p.detach() for pair in zip(values, biases, strict=True) for p in pair
+        ]
+        hidden = model.activate(hidden, net[2 * start : 2 * stop], start, stop)
+    return codes, net
+
+
+def _outputs(model: Model, features: Any) -> tuple[list[Any], list[Any]]:
+    """Outputs [n, width] of each block of the float model, and the importance of their errors.
+
+    Importance is the squared derivative of the colour, summed over its channels: the diagonal of
+    the Gauss-Newton matrix, where BRECQ takes that of the Fisher information.
+    """
+    import torch
+
+    outputs: list[Any] = []
+    x = features.requires_grad_()
+    for start, stop in model.blocks:
+        x = model.activate(x, model.net[2 * start : 2 * stop], start, stop)
+        outputs.append(x)
+    importance = [torch.zeros_like(x) for x in outputs]
+    for channel in range(x.shape[1]):
+        slopes = torch.autograd.grad(x[:, channel].sum(), outputs, retain_graph=True)
+        for total, slope in zip(importance, slopes, strict=True):
+            total += slope**2
+    return [x.detach() for x in outputs], importance

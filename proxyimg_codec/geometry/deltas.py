@@ -1,0 +1,69 @@
+"""Coding of signed integers, mostly small: an adaptive class of magnitude, then raw bits."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..entropy import arrays
+from ..errors import FormatError
+
+Ints = NDArray[np.int64]
+
+_ESCAPE = 15
+"""Class of values of 15 bits and more, whose magnitude takes 31 raw bits."""
+
+
+def encode(values: Ints) -> tuple[bytes, bytes]:
+    """Classes (a coded array [C, 1, N]) and raw bits of `values` [C, N], each below 2**31."""
+    bits = np.where(values == 0, 0, np.floor(np.log2(np.maximum(np.abs(values), 1))) + 1)
+    classes = np.minimum(bits.astype(np.int64), _ESCAPE)
+    coded = arrays.encode(classes[:, None, :], 4, np.ones((1, values.shape[1]), bool))
+    raw = "".join(
+        f"{int(v < 0)}{_magnitude(int(abs(v)), int(c))}"
+        for v, c in zip(values.ravel(), classes.ravel(), strict=True)
+        if c
+    )
+    raw += "0" * (-len(raw) % 8)
+    return coded, int(raw, 2).to_bytes(len(raw) // 8, "big") if raw else b""
+
+
+def _magnitude(value: int, klass: int) -> str:
+    if klass == _ESCAPE:
+        return f"{value:031b}"
+    return f"{value:b}"[1:]
+
+
+def decode(coded: bytes, raw: bytes, channels: int, count: int, where: str) -> Ints:
+    """Inverse of `encode`: values [channels, count].
+
+    Raises:
+        FormatError: Corrupt streams, a wrong length, or a class that is larger than needed.
+    """
+    stored = np.ones((1, count), bool)
+    classes = arrays.decode(coded, (channels, 1, count), 4, stored).ravel().astype(np.int64)
+    return _read(raw, classes, where).reshape(channels, count)
+
+
+def _read(data: bytes, classes: Ints, where: str) -> Ints:
+    """Signed values [N] from the raw bits after each class [N]."""
+    width = np.where(classes == _ESCAPE, 32, classes)
+    ends = np.cumsum(width)
+    total = int(ends[-1])
+    if len(data) != (total + 7) // 8:
+        raise FormatError("the raw bits of the deltas have the wrong length", where)
+    bits = np.unpackbits(np.frombuffer(data, np.uint8)).astype(np.int64)
+    if bits[total:].any():
+        raise FormatError("padding bits of the deltas are not zero", where)
+    out = np.zeros(len(classes), np.int64)
+    for k in np.unique(classes[classes > 0]):
+        at = np.flatnonzero(classes == k)
+        n = 31 if k == _ESCAPE else int(k) - 1
+        first = ends[at] - n
+        weights = np.int64(1) << np.arange(n - 1, -1, -1, dtype=np.int64)
+        value = bits[first[:, None] + np.arange(n)] @ weights
+        if k == _ESCAPE and (value < 1 << (_ESCAPE - 1)).any():
+            raise FormatError("a delta is coded in a larger class than it needs", where)
+        value += 0 if k == _ESCAPE else 1 << n
+        out[at] = np.where(bits[first - 1] == 1, -value, value)
+    return out

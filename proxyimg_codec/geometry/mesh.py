@@ -1,0 +1,434 @@
+"""Proxy nodes: a triangle mesh over a layer at rest, refined 1 to 4, and its coding.
+
+Hierarchy 1 is a *base* of triangles whose vertices lie on a 256 x 256 lattice. Split flags refine
+triangles into four, level by level; what remains uneven is closed, so that the *faces* conform.
+A file stores vertices, connectivity and flags; no decoder ever runs a mesher.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..entropy import arrays
+from ..errors import FormatError
+from ..limits import DEFAULT_LIMITS, Limits
+from . import deltas
+
+Ints = NDArray[np.int64]
+Edge = tuple[int, int]
+Point = tuple[int, int]
+
+FRACTION_BITS = 10
+"""Node positions and all posed geometry are in 1/1024 canvas pixel."""
+
+LEVELS_MAX = 4
+"""Most refinements of a base triangle."""
+
+BORDER, NEW, RANKED, FAR = 0, 1, 2, 15
+"""Symbols of a gate: nothing beyond it, a new vertex, the vertex of rank s - 2, any old vertex."""
+
+
+@dataclass(frozen=True, eq=False)
+class Base:
+    """Hierarchy 1.
+
+    Attributes:
+        origin: x, y of lattice point (0, 0) in whole canvas pixels.
+        step: Lattice spacing across and down in 1/1024 canvas pixel; a multiple of 2**levels keeps
+            all midpoints exact.
+        vertices: uint8 [V, 2] x, y on the lattice.
+        triangles: int32 [T, 3], all with (b - a) x (c - a) > 0 (x right, y down); every directed
+            edge occurs once at most.
+    """
+
+    origin: tuple[int, int]
+    step: tuple[int, int]
+    vertices: NDArray[np.uint8]
+    triangles: NDArray[np.int32]
+
+    @property
+    def positions(self) -> Ints:
+        """int64 [V, 2] in 1/1024 canvas pixel."""
+        corner = np.array(self.origin, np.int64) << FRACTION_BITS
+        return corner + self.vertices.astype(np.int64) * np.array(self.step, np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """All nodes, and the triangles that cover the layer once.
+
+    Attributes:
+        nodes: int64 [N, 2] rest positions in 1/1024 canvas pixel: the vertices of the base, then
+            midpoints, level by level.
+        parents: int32 [N, 2] the nodes that a midpoint lies between; of a vertex itself.
+        faces: int32 [F, 3] conforming triangles, in the order of the base triangles.
+    """
+
+    nodes: Ints
+    parents: NDArray[np.int32]
+    faces: NDArray[np.int32]
+
+
+class Mesh:
+    """A layer's mesh: its coded fields, decoded when first needed.
+
+    Attributes:
+        fields: Of the MESH chunk, without the layer.
+    """
+
+    def __init__(
+        self,
+        fields: Mapping[str, Any],
+        where: str = "chunk MESH",
+        limits: Limits = DEFAULT_LIMITS,
+    ) -> None:
+        self.fields = fields
+        self._where = where
+        self._limits = limits
+
+    @staticmethod
+    def build(base: Base) -> Mesh:
+        """The mesh of a base whose vertices and triangles come in any order.
+
+        Raises:
+            ValueError: A triangle is not positive, a directed edge occurs twice, or a vertex
+                belongs to no triangle.
+        """
+        return Mesh({**_encode(base), "levels": 0, "splits": b""})
+
+    def split(self, flags: Sequence[NDArray[np.bool_]]) -> Mesh:
+        """The mesh with other split flags.
+
+        Args:
+            flags: For each level which triangles become four: bool [T] for `base`, then [4 n] for
+                the children of the n triangles that were split, in their order.
+        """
+        kept = [f for f in flags if f.any()]
+        data = b""
+        for values in kept:
+            coded = arrays.encode(
+                values.astype(np.int64)[None, None], 1, np.ones((1, len(values)), bool)
+            )
+            data += len(coded).to_bytes(4, "little") + coded
+        return Mesh({**self.fields, "levels": len(kept), "splits": data}, self._where)
+
+    @cached_property
+    def base(self) -> Base:
+        """Hierarchy 1 in the order of the file.
+
+        Raises:
+            FormatError: The coded mesh is corrupt.
+        """
+        return _decode(self.fields, self._where)
+
+    @cached_property
+    def splits(self) -> list[NDArray[np.bool_]]:
+        """Split flags of each level, in the order of the file.
+
+        Raises:
+            FormatError: They are corrupt.
+        """
+        data, at = self.fields["splits"], 0
+        flags, count = [], len(self.base.triangles)
+        for _ in range(self.fields["levels"]):
+            end = at + 4 + int.from_bytes(data[at : at + 4], "little")
+            if end > len(data) or count == 0:
+                raise FormatError("split flags are truncated", self._where)
+            self._limits.check("faces", 4 * count)
+            values = arrays.decode(data[at + 4 : end], (1, 1, count), 1, np.ones((1, count), bool))
+            flags.append(values[0, 0] > 0)
+            count, at = 4 * int(flags[-1].sum()), end
+        if at != len(data) or (flags and not flags[-1].any()):
+            raise FormatError("split flags do not end where they should", self._where)
+        return flags
+
+    @cached_property
+    def refined(self) -> Refined:
+        """Nodes and faces.
+
+        Raises:
+            FormatError: The coded mesh is corrupt.
+            LimitError: It has too many faces.
+        """
+        return refine(self.base, self.splits)
+
+
+def refine(base: Base, splits: Sequence[NDArray[np.bool_]]) -> Refined:
+    """Splits triangles 1 to 4 by flags, then closes those that have a split edge.
+
+    The four children of a, b, c with midpoints d (of ab), e (bc), f (ca) are (a, d, f), (d, b, e),
+    (f, e, c), (d, e, f). Midpoints of a level are numbered by ascending (smaller, larger) end.
+    Faces stand in the order of the base triangles that they lie in, so that where a bent mesh
+    overlaps, whole parts of it win. Within one: unsplit triangles level by level, the last
+    children, and closing triangles last.
+    """
+    nodes = base.positions
+    parents = np.repeat(np.arange(len(nodes), dtype=np.int32)[:, None], 2, axis=1)
+    triangles, done = base.triangles, []
+    origin, origins = np.arange(len(triangles)), []
+    for split in splits:
+        done.append(triangles[~split])
+        origins.append(origin[~split])
+        parts = triangles[split]
+        ends = np.unique(np.sort(_edges(parts).reshape(-1, 2), axis=1), axis=0)
+        fresh = ends[_midpoints(parents, len(base.vertices), ends) < 0]
+        nodes = np.concatenate([nodes, (nodes[fresh[:, 0]] + nodes[fresh[:, 1]]) >> 1])
+        parents = np.concatenate([parents, fresh.astype(np.int32)])
+        middle = _midpoints(parents, len(base.vertices), _edges(parts).reshape(-1, 2))
+        (a, b, c), (d, e, f) = parts.T, middle.reshape(-1, 3).T
+        four = np.stack([a, d, f, d, b, e, f, e, c, d, e, f], axis=1)
+        triangles = four.reshape(-1, 3).astype(np.int32)
+        origin = np.repeat(origin[split], 4)
+    faces, origin = _close(
+        np.concatenate([*done, triangles]),
+        np.concatenate([*origins, origin]),
+        parents,
+        len(base.vertices),
+    )
+    return Refined(nodes, parents, faces[np.argsort(origin, kind="stable")])
+
+
+def _edges(triangles: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Edges ab, bc, ca [T, 3, 2]."""
+    return np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2)
+
+
+def _midpoints(parents: NDArray[np.int32], vertices: int, ends: NDArray[np.int32]) -> Ints:
+    """The midpoint of each edge `ends` [M, 2], or -1 where it has none."""
+    count = len(parents)
+    if count == vertices or not len(ends):
+        return np.full(len(ends), -1, np.int64)
+    keys = parents[vertices:, 0].astype(np.int64) * count + parents[vertices:, 1]
+    order = np.argsort(keys)
+    low, high = ends.min(1).astype(np.int64), ends.max(1)
+    wanted = low * count + high
+    at = np.minimum(np.searchsorted(keys, wanted, sorter=order), len(keys) - 1)
+    return np.where(keys[order[at]] == wanted, vertices + order[at], -1)
+
+
+def _close(
+    triangles: NDArray[np.int32], origin: Ints, parents: NDArray[np.int32], vertices: int
+) -> tuple[NDArray[np.int32], Ints]:
+    """Divides triangles at the midpoints on their edges until none is left inside an edge.
+
+    Returns them with the base triangle that each lies in.
+    """
+    done, origins = [], []
+    while True:
+        middle = _midpoints(parents, vertices, _edges(triangles).reshape(-1, 2)).reshape(-1, 3)
+        split = (middle >= 0).sum(1)
+        done.append(triangles[split == 0])
+        origins.append(origin[split == 0])
+        if not split.any():
+            return np.concatenate(done), np.concatenate(origins)
+        # Turn each triangle so that an unsplit edge is last, and a lone split edge first.
+        turn = np.where(split == 1, np.argmax(middle >= 0, 1), (np.argmin(middle, 1) + 1) % 3)
+        turn[split == 3] = 0
+        at = (turn[:, None] + np.arange(3)) % 3
+        corner = np.take_along_axis(triangles, at, 1)
+        middle = np.take_along_axis(middle, at, 1).astype(np.int32)
+        (a, b, c), (d, e, f) = corner.T, middle.T
+        patterns = {
+            1: (a, d, c, d, b, c),
+            2: (d, b, e, a, d, c, d, e, c),
+            3: (a, d, f, d, b, e, f, e, c, d, e, f),
+        }
+        parts = [np.stack(p, axis=1)[split == n].reshape(-1, 3) for n, p in patterns.items()]
+        triangles = np.concatenate(parts)
+        origin = np.concatenate([np.repeat(origin[split == n], n + 1) for n in patterns])
+
+
+class _Border:
+    """The growing mesh while it is coded: gates are directed edges that wait for a triangle."""
+
+    def __init__(self, count: int) -> None:
+        self.place = np.zeros((count, 2), np.int64)
+        self.open = np.zeros(count, np.int64)
+        self.known = 0
+        self.waiting: dict[Edge, int] = {}
+        self.used: set[Edge] = set()
+        self.queue: deque[Edge] = deque()
+
+    def add(self, x: int, y: int) -> int:
+        """A new vertex."""
+        self.place[self.known] = x, y
+        self.known += 1
+        return self.known - 1
+
+    def at(self, vertex: int) -> Point:
+        """Where a vertex is."""
+        x, y = self.place[vertex].tolist()
+        return x, y
+
+    def next_gate(self) -> tuple[Edge, int] | None:
+        """The next gate and the vertex on its near side."""
+        while self.queue:
+            edge = self.queue.popleft()
+            if edge in self.waiting:
+                near = self.waiting.pop(edge)
+                self.open[list(edge)] -= 1
+                return edge, near
+        return None
+
+    def predicted(self, edge: Edge, near: int) -> Point:
+        """The fourth corner of the parallelogram on the far side of a gate."""
+        (ax, ay), (bx, by), (x, y) = self.place[[*edge, near]].tolist()
+        return ax + bx - x, ay + by - y
+
+    def ranked(self, edge: Edge, near: int) -> Ints:
+        """Vertices at gates that could close the triangle, the nearest to the prediction first."""
+        at = np.flatnonzero(self.open[: self.known] > 0)
+        a, b = self.place[edge[0]], self.place[edge[1]]
+        p = self.place[at]
+        side = (a[0] - b[0]) * (p[:, 1] - b[1]) - (a[1] - b[1]) * (p[:, 0] - b[0])
+        at = at[side > 0]
+        distance = ((self.place[at] - self.predicted(edge, near)) ** 2).sum(1)
+        ranked: Ints = at[np.lexsort((at, distance))]
+        return ranked
+
+    def place_triangle(self, a: int, b: int, c: int) -> bool:
+        """Adds a triangle; false if it is not positive or an edge of it is taken."""
+        (ax, ay), (bx, by), (cx, cy) = self.place[[a, b, c]].tolist()
+        edges = ((a, b), (b, c), (c, a))
+        if (bx - ax) * (cy - ay) <= (by - ay) * (cx - ax) or not self.used.isdisjoint(edges):
+            return False
+        for (x, y), far in zip(edges, (c, a, b), strict=True):
+            self.used.add((x, y))
+            if (y, x) in self.waiting:
+                del self.waiting[y, x]
+                self.open[[x, y]] -= 1
+            elif (y, x) not in self.used:
+                self.waiting[x, y] = far
+                self.open[[x, y]] += 1
+                self.queue.append((x, y))
+        return True
+
+
+def _encode(base: Base) -> dict[str, Any]:
+    beyond: dict[Edge, int] = {}
+    for a, b, c in base.triangles.tolist():
+        beyond |= {(a, b): c, (b, c): a, (c, a): b}
+    if len(beyond) < 3 * len(base.triangles):
+        raise ValueError("a directed edge of the mesh occurs twice")
+    border = _Border(len(base.vertices))
+    new: dict[int, int] = {}
+    old: list[int] = []
+    symbols: list[int] = []
+    far: list[int] = []
+    residuals: list[tuple[int, int]] = []
+
+    def put(vertex: int, expected: Point, ranked: Ints | None) -> int:
+        if vertex not in new:
+            x, y = map(int, base.vertices[vertex])
+            symbols.append(NEW)
+            residuals.append((_wrapped(x - expected[0]), _wrapped(y - expected[1])))
+            old.append(vertex)
+            new[vertex] = border.add(x, y)
+            return new[vertex]
+        rank = np.flatnonzero(ranked == new[vertex]) if ranked is not None else np.zeros(0)
+        if len(rank) and rank[0] < FAR - RANKED:
+            symbols.append(RANKED + int(rank[0]))
+        else:
+            symbols.append(FAR)
+            far.append(new[vertex])
+        return new[vertex]
+
+    def place(a: int, b: int, c: int) -> None:
+        if not border.place_triangle(a, b, c):
+            raise ValueError("a triangle of the mesh is not positive")
+
+    for corners in base.triangles.tolist():
+        if (new.get(corners[0], -1), new.get(corners[1], -1)) in border.used:
+            continue
+        last = (0, 0)
+        for vertex in corners:
+            last = border.at(put(vertex, last, None))
+        place(*(new[v] for v in corners))
+        while (gate := border.next_gate()) is not None:
+            (x, y), near = gate
+            apex = beyond.get((old[y], old[x]))
+            if apex is None:
+                symbols.append(BORDER)
+                continue
+            edge = (x, y)
+            place(y, x, put(apex, border.predicted(edge, near), border.ranked(edge, near)))
+    if len(new) < len(base.vertices):
+        raise ValueError("a vertex of the mesh belongs to no triangle")
+    classes, raw = deltas.encode(np.array(residuals, np.int64).T)
+    return {
+        "origin": list(base.origin),
+        "step": list(base.step),
+        "vertices": len(residuals),
+        "gates": len(symbols),
+        "symbols": arrays.encode(
+            np.array(symbols)[None, None], 4, np.ones((1, len(symbols)), bool)
+        ),
+        "far": far,
+        "classes": classes,
+        "deltas": raw,
+    }
+
+
+def _wrapped(difference: int) -> int:
+    """The difference modulo 256 in -128..127."""
+    return (difference + 128) % 256 - 128
+
+
+def _decode(fields: Mapping[str, Any], where: str) -> Base:
+    gates, count = fields["gates"], fields["vertices"]
+    data = arrays.decode(fields["symbols"], (1, 1, gates), 4, np.ones((1, gates), bool))
+    symbols = iter(data.ravel().tolist())
+    far = iter(fields["far"])
+    residuals = iter(deltas.decode(fields["classes"], fields["deltas"], 2, count, where).T.tolist())
+    border = _Border(count)
+    triangles: list[tuple[int, int, int]] = []
+
+    def get(symbol: int, expected: Point, ranked: Ints | None) -> int:
+        if symbol == NEW:
+            dx, dy = next(residuals)
+            return border.add((expected[0] + dx) % 256, (expected[1] + dy) % 256)
+        if symbol == FAR:
+            vertex = int(next(far))
+        elif ranked is not None and 0 <= symbol - RANKED < len(ranked):
+            vertex = int(ranked[symbol - RANKED])
+        else:
+            raise IndexError
+        if vertex >= border.known:
+            raise IndexError
+        return vertex
+
+    def place(a: int, b: int, c: int) -> None:
+        if not border.place_triangle(a, b, c):
+            raise FormatError("a triangle of the mesh is not positive, or overlaps", where)
+        triangles.append((a, b, c))
+
+    try:
+        for symbol in symbols:
+            last, corners = (0, 0), []
+            for k in range(3):
+                corners.append(get(next(symbols) if k else symbol, last, None))
+                last = border.at(corners[-1])
+            place(*corners)
+            while (gate := border.next_gate()) is not None:
+                (x, y), near = gate
+                symbol = next(symbols)
+                if symbol != BORDER:
+                    ranked = border.ranked((x, y), near) if symbol > NEW else None
+                    place(y, x, get(symbol, border.predicted((x, y), near), ranked))
+    except (StopIteration, IndexError):
+        raise FormatError("the connectivity of the mesh is corrupt", where) from None
+    if border.known != count or next(far, None) is not None:
+        raise FormatError("the connectivity of the mesh does not use all its vertices", where)
+    return Base(
+        (fields["origin"][0], fields["origin"][1]),
+        (fields["step"][0], fields["step"][1]),
+        border.place[: border.known].astype(np.uint8),
+        np.array(triangles, np.int32),
+    )

@@ -1,0 +1,231 @@
+"""The present state of a layer: where it was moved, how it was bent, how it is shown.
+
+A pose stands over the geometry at rest: first its nodes are displaced, then an affine map is
+applied. Both are fixed-point, so that moving there and back is exact.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FormatError
+from . import deltas
+from .mesh import FRACTION_BITS, Mesh, Refined
+
+Ints = NDArray[np.int64]
+Matrix = tuple[float, float, float, float, float, float]
+"""a, b, c, d, e, f: x' = a x + c y + e, y' = b x + d y + f, in canvas pixels (as in SVG)."""
+
+MATRIX_BITS = 24
+MATRIX_MAX = 1 << 31
+"""Matrix entries are in 2**-24 and below 2**31: less than 128 times larger."""
+
+SHIFT_MAX = 1 << 33
+"""Shifts are in 1/1024 px and below 2**33."""
+
+POINT_MAX = 1 << 30
+"""Points are clamped to that many 1/1024 px before they are mapped."""
+
+NODE_BITS = 4
+"""Displacements of nodes are in 1/16 px."""
+
+NODE_MAX = 1 << 24
+
+OPACITY_MAX = 65535
+COLOUR_BITS = 12
+COLOUR_MAX = 1 << 20
+"""Entries of the colour matrix are in 2**-12 and at most 2**20 in magnitude."""
+
+_UNIT = 1 << MATRIX_BITS
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """What edits have done to a layer.
+
+    Attributes:
+        matrix: a, b, c, d of the affine map in 2**-24.
+        shift: e, f of the affine map in 1/1024 canvas pixel.
+        nodes: int64 [N, 2] displacement of each node in 1/16 canvas pixel, or None.
+        places: int64 [N, 2] displacement of the point of the texture that each node shows, in
+            1/16 canvas pixel, or None.
+        opacity: 0..65535.
+        hidden: Whether the layer is not drawn.
+        colour: Rows of a 3 x 4 matrix in 2**-12 that maps colour and one to colour, or ().
+    """
+
+    matrix: tuple[int, int, int, int] = (_UNIT, 0, 0, _UNIT)
+    shift: tuple[int, int] = (0, 0)
+    nodes: Ints | None = None
+    places: Ints | None = None
+    opacity: int = OPACITY_MAX
+    hidden: bool = False
+    colour: tuple[int, ...] = ()
+
+    @property
+    def affine(self) -> bool:
+        """Whether the affine map does anything."""
+        return self.matrix != (_UNIT, 0, 0, _UNIT) or self.shift != (0, 0)
+
+    @property
+    def mirrored(self) -> bool:
+        """Whether the affine map exchanges left and right turns."""
+        a, b, c, d = self.matrix
+        return a * d < b * c
+
+    @property
+    def bent(self) -> bool:
+        """Whether the mesh is needed to draw the layer."""
+        return self.nodes is not None or self.places is not None
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether nothing was done at all."""
+        plain = self.opacity == OPACITY_MAX and not self.hidden and not self.colour
+        return plain and not self.affine and not self.bent
+
+    @property
+    def floats(self) -> Matrix:
+        """The affine map in canvas pixels."""
+        a, b, c, d = (v / _UNIT for v in self.matrix)
+        e, f = (v / (1 << FRACTION_BITS) for v in self.shift)
+        return a, b, c, d, e, f
+
+    def apply(self, points: Ints) -> Ints:
+        """Maps points [N, 2] in 1/1024 canvas pixel; exact, half up."""
+        if not self.affine:
+            return points
+        x, y = np.clip(points, -POINT_MAX, POINT_MAX).T
+        a, b, c, d = self.matrix
+        half = 1 << (MATRIX_BITS - 1)
+        return np.stack(
+            [
+                ((a * x + c * y + half) >> MATRIX_BITS) + self.shift[0],
+                ((b * x + d * y + half) >> MATRIX_BITS) + self.shift[1],
+            ],
+            axis=1,
+        )
+
+    def present(self, refined: Refined) -> Ints:
+        """Present positions [N, 2] of all nodes in 1/1024 canvas pixel."""
+        nodes = refined.nodes
+        if self.nodes is not None:
+            nodes = nodes + (self.nodes << (FRACTION_BITS - NODE_BITS))
+        return self.apply(nodes)
+
+
+REST = Pose()
+
+
+def inverse(matrix: Matrix) -> Matrix:
+    """The inverse of an affine map; its determinant must not be 0."""
+    a, b, c, d, e, f = matrix
+    # Exact: in floating point the determinant of a map that is not singular can become 0.
+    det = float(Fraction(a) * Fraction(d) - Fraction(b) * Fraction(c))
+    a, b, c, d = d / det, -b / det, -c / det, a / det
+    return a, b, c, d, -(a * e + c * f), -(b * e + d * f)
+
+
+def product(outer: Matrix, inner: Matrix) -> Matrix:
+    """The affine map that does `inner` first, then `outer`."""
+    a, b, c, d, e, f = outer
+    p, q, r, s, t, u = inner
+    return (
+        a * p + c * q, b * p + d * q, a * r + c * s, b * r + d * s,
+        a * t + c * u + e, b * t + d * u + f,
+    )  # fmt: skip
+
+
+def fixed(matrix: Matrix) -> tuple[tuple[int, int, int, int], tuple[int, int]] | None:
+    """Matrix and shift of a pose, rounded; None if it is singular or leaves the range."""
+    if not all(map(math.isfinite, matrix)):
+        return None
+    a, b, c, d = (round(v * _UNIT) for v in matrix[:4])
+    e, f = (round(v * (1 << FRACTION_BITS)) for v in matrix[4:])
+    if max(map(abs, (a, b, c, d))) >= MATRIX_MAX or max(abs(e), abs(f)) >= SHIFT_MAX:
+        return None
+    return None if a * d == b * c else ((a, b, c, d), (e, f))
+
+
+def encode(pose: Pose, mesh: Mesh | None) -> dict[str, Any]:
+    """The fields of POSE, without the layer."""
+    out: dict[str, Any] = {
+        "matrix": list(pose.matrix), "shift": list(pose.shift), "opacity": pose.opacity,
+        "hidden": int(pose.hidden), "colour": list(pose.colour),
+    }  # fmt: skip
+    for name, values in (("node", pose.nodes), ("place", pose.places)):
+        classes = raw = b""
+        if values is not None:
+            assert mesh is not None, "displacements need a mesh"
+            classes, raw = deltas.encode(_residuals(values, mesh.refined).T)
+        out |= {f"{name}_classes": classes, f"{name}_deltas": raw}
+    return out
+
+
+def decode(fields: Mapping[str, Any], mesh: Mesh | None, where: str) -> Pose:
+    """Inverse of `encode`.
+
+    Raises:
+        FormatError: Corrupt streams, displacements without a mesh, a singular matrix, or a pose
+            that does nothing.
+    """
+    a, b, c, d = fields["matrix"]
+    if a * d == b * c:
+        raise FormatError("the matrix is singular", where)
+    if len(fields["colour"]) not in (0, 12):
+        raise FormatError("the colour matrix does not have 12 entries", where)
+    arrays: list[Ints | None] = []
+    for name in ("node", "place"):
+        coded, raw = fields[f"{name}_classes"], fields[f"{name}_deltas"]
+        if not coded and raw:
+            raise FormatError("displacements have raw bits without classes", where)
+        if not coded:
+            arrays.append(None)
+            continue
+        if mesh is None:
+            raise FormatError("displacements need a mesh", where)
+        refined = mesh.refined
+        values = _values(deltas.decode(coded, raw, 2, len(refined.nodes), where).T, refined, mesh)
+        if np.abs(values).max() >= NODE_MAX:
+            raise FormatError("a displacement is out of range", where)
+        if not values.any():
+            raise FormatError("displacements are all zero", where)
+        arrays.append(values)
+    pose = Pose(
+        (a, b, c, d), (fields["shift"][0], fields["shift"][1]), arrays[0], arrays[1],
+        fields["opacity"], bool(fields["hidden"]), tuple(fields["colour"]),
+    )  # fmt: skip
+    if pose.at_rest:
+        raise FormatError("the pose does nothing", where)
+    return pose
+
+
+def _residuals(values: Ints, refined: Refined) -> Ints:
+    """Vertices against the one before, midpoints against the mean of their ends, rounded down."""
+    own = refined.parents[:, 0] == refined.parents[:, 1]
+    before = np.concatenate([np.zeros((1, 2), np.int64), values[:-1]])
+    mean = (values[refined.parents[:, 0]] + values[refined.parents[:, 1]]) >> 1
+    return values - np.where(own[:, None], before, mean)
+
+
+def _values(residuals: Ints, refined: Refined, mesh: Mesh) -> Ints:
+    """Inverse of `_residuals`."""
+    count = len(mesh.base.vertices)
+    out = residuals.copy()
+    out[:count] = np.cumsum(residuals[:count], axis=0)
+    done = count
+    while done < len(out):
+        # Midpoints are numbered by level: those whose ends are known come next.
+        ready = (refined.parents[done:] < done).all(1)
+        stop = len(out) if ready.all() else done + int(np.argmin(ready))
+        ends = refined.parents[done:stop]
+        out[done:stop] += (out[ends[:, 0]] + out[ends[:, 1]]) >> 1
+        done = stop
+    return out

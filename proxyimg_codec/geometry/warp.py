@@ -1,0 +1,289 @@
+"""Where a posed layer lies now, and which point of its texture each sample shows."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..limits import DEFAULT_LIMITS, Limits
+from .boundary import Boundary
+from .mesh import FRACTION_BITS, Mesh
+from .pose import NODE_BITS, Pose, inverse
+from .raster import rasterize
+
+Ints = NDArray[np.int64]
+Floats = NDArray[np.float64]
+
+PIECE = 4 << FRACTION_BITS
+"""Bent boundaries are divided into pieces of about 4 px."""
+
+PIECES_LOG2_MAX = 6
+GRID_BITS = 22
+"""Extent in bits of a mesh, beyond which positions are coarsened to compute weights."""
+
+WEIGHT_BITS, WEIGHT_MAX = 16, 1 << 20
+BATCH = 1 << 21
+"""Pairs of points and triangles handled at a time; bounds memory."""
+
+RUN = 48
+"""Control points looked up together: neighbours on a path lie in few faces."""
+
+
+def outline(
+    boundary: Boundary | None, pose: Pose, mesh: Mesh | None, size: tuple[int, int]
+) -> Boundary | None:
+    """The boundary in its present place, in 1/1024 px if it was moved; None covers everything.
+
+    Args:
+        boundary: At rest; None is the canvas.
+        pose: The layer's.
+        mesh: Needed if the pose displaces nodes.
+        size: Width and height of the canvas.
+    """
+    if not pose.affine and pose.nodes is None:
+        return boundary
+    if boundary is None:
+        boundary = _rectangle(size)
+    if pose.nodes is None:
+        up = FRACTION_BITS - boundary.unit
+        return Boundary(FRACTION_BITS, tuple(pose.apply(p << up) for p in boundary.paths))
+    assert mesh is not None, "displaced nodes need a mesh"
+    ride = _ride(boundary, mesh)
+    moved = ride.points + ride.displacement(pose.nodes << (FRACTION_BITS - NODE_BITS))
+    parts = np.split(pose.apply(moved), np.cumsum(ride.lengths)[:-1])
+    return Boundary(FRACTION_BITS, tuple(parts))
+
+
+@functools.lru_cache(maxsize=64)
+def _rectangle(size: tuple[int, int]) -> Boundary:
+    """The canvas as a path of four straight segments whose inner control points are its corners."""
+    w, h = size
+    corners = np.array([[0, 0], [w, 0], [w, h], [0, h]], np.int64)
+    after = np.roll(corners, -1, 0)
+    return Boundary(0, (np.stack([corners, corners, after], axis=1).reshape(-1, 2),))
+
+
+@dataclass(frozen=True, eq=False)
+class _Riders:
+    """Control points on a mesh: positions [n, 2], nodes [n, 3], weights [n, 3], path lengths."""
+
+    points: Ints
+    nodes: NDArray[np.int32]
+    weights: Ints
+    lengths: list[int]
+
+    def displacement(self, nodes: Ints) -> Ints:
+        """Displacement [n, 2] of the points for that of all nodes [N, 2], half up."""
+        total = (self.weights[..., None] * nodes[self.nodes]).sum(1)
+        rounded: Ints = (total + (1 << (WEIGHT_BITS - 1))) >> WEIGHT_BITS
+        return rounded
+
+
+@functools.lru_cache(maxsize=64)
+def _ride(boundary: Boundary, mesh: Mesh) -> _Riders:
+    """The control points of a boundary, divided into short pieces, on the faces of a mesh."""
+    paths = [divide(p << (FRACTION_BITS - boundary.unit)) for p in boundary.paths]
+    points = np.concatenate(paths)
+    refined = mesh.refined
+    face, weights = barycentric(points, refined.nodes, refined.faces)
+    return _Riders(points, refined.faces[face], weights, [len(p) for p in paths])
+
+
+def divide(path: Ints) -> Ints:
+    """Divides the segments of a path [3 m, 2] in 1/1024 px into 2**k pieces of equal parameter.
+
+    k is the smallest for which no coordinate of its four control points spans more than
+    `PIECE` * 2**k, at most `PIECES_LOG2_MAX`. Control points are blossoms, rounded down.
+    """
+    p = np.stack([path[0::3], path[1::3], path[2::3], np.roll(path[0::3], -1, 0)], 1)
+    span = (p.max(1) - p.min(1)).max(1)
+    k = np.zeros(len(p), np.int64)
+    for _ in range(PIECES_LOG2_MAX):
+        k += span > PIECE << k
+    k = np.minimum(k, PIECES_LOG2_MAX)
+    count = 1 << k
+    segment = np.repeat(np.arange(len(p)), count)
+    i = np.arange(len(segment)) - np.repeat(np.cumsum(count) - count, count)
+    q, n, shift = p[segment], count[segment][:, None], 3 * k[segment][:, None]
+    near, far = i[:, None], i[:, None] + 1
+
+    def blossom(*times: Ints) -> Ints:
+        points = [q[:, j] for j in range(4)]
+        for t in times:
+            points = [(n - t) * a + t * b for a, b in pairwise(points)]
+        return points[0] >> shift
+
+    parts = [blossom(near, near, near), blossom(near, near, far), blossom(near, far, far)]
+    return np.stack(parts, axis=1).reshape(-1, 2)
+
+
+def barycentric(
+    points: Ints, nodes: Ints, faces: NDArray[np.int32], limits: Limits = DEFAULT_LIMITS
+) -> tuple[NDArray[np.int64], Ints]:
+    """The face [n] that holds each point, and its weights [n, 3] in 2**-16, in integers.
+
+    The first face whose three edge functions are not negative holds a point; if there is none, the
+    one whose corners' sum lies nearest to three times the point. Of equals the first.
+
+    Raises:
+        LimitError: Too many points lie beyond the mesh.
+    """
+    low = nodes.min(0)
+    extent = int((nodes.max(0) - low).max())
+    shift = max(extent.bit_length() - GRID_BITS, 0)
+    grid = (nodes - low) >> shift
+    at = np.clip((points - low) >> shift, -(1 << GRID_BITS), 1 << (GRID_BITS + 1))
+    corners = grid[faces]  # [F, 3, 2]
+    first, last = corners.min(1), corners.max(1)
+    face = np.full(len(points), -1, np.int64)
+    for start in range(0, len(points), RUN):
+        part = at[start : start + RUN]
+        near = np.flatnonzero(
+            ((first <= part.max(0)) & (last >= part.min(0))).all(1)
+        )  # ascending, so that the first of them is the first of all
+        if len(near):
+            inside = np.ones((len(part), len(near)), bool)
+            for i, j in ((0, 1), (1, 2), (2, 0)):
+                inside &= _side(corners[near, i], corners[near, j], part[:, None]) >= 0
+            found = near[inside.argmax(1)]
+            face[start : start + RUN] = np.where(inside.any(1), found, -1)
+    lost = np.flatnonzero(face < 0)
+    limits.check("beyond", len(lost) * len(faces))
+    face[lost] = nearest(3 * at[lost], corners.sum(1))
+    a, b, c = (corners[face, i] for i in range(3))
+    area = np.maximum(_side(a, b, c), 1)
+    weights = [
+        np.clip((_side(p, q, at) << WEIGHT_BITS) // area, -WEIGHT_MAX, WEIGHT_MAX)
+        for p, q in ((c, a), (a, b))
+    ]
+    rest = (1 << WEIGHT_BITS) - weights[0] - weights[1]
+    return face, np.stack([rest, *weights], axis=1)
+
+
+def _side(a: Ints, b: Ints, p: Ints) -> Ints:
+    """Twice the area of a, b, p."""
+    along, to = b - a, p - a
+    return along[..., 0] * to[..., 1] - along[..., 1] * to[..., 0]
+
+
+def nearest(points: NDArray[Any], centres: NDArray[Any]) -> NDArray[np.int64]:
+    """The centre [n] nearest to each point [n, 2]; of equals the first."""
+    out = np.zeros(len(points), np.int64)
+    per = max(BATCH // len(centres), 1)
+    for start in range(0, len(points), per):
+        part = points[start : start + per, None]
+        out[start : start + per] = ((centres - part) ** 2).sum(2).argmin(1)
+    return out
+
+
+class Located(NamedTuple):
+    """Samples on a posed layer.
+
+    Attributes:
+        x: float64 [n] the point of the texture that each shows, in canvas pixels.
+        y: Likewise.
+        face: int64 [n] the face it lies in, or None where no mesh was needed.
+        weights: float64 [n, 3] its barycentric weights there, or None.
+    """
+
+    x: Floats
+    y: Floats
+    face: NDArray[np.int64] | None = None
+    weights: Floats | None = None
+
+
+class Warp:
+    """The map from the canvas to a layer's texture.
+
+    Args:
+        pose: The layer's.
+        mesh: Its mesh; consulted if the pose is bent or `meshed`.
+        meshed: Whether faces and weights are wanted in any case.
+        limits: Bounds how often samples may be covered, and how many may lie beyond the mesh.
+    """
+
+    def __init__(
+        self,
+        pose: Pose,
+        mesh: Mesh | None,
+        meshed: bool = False,
+        limits: Limits = DEFAULT_LIMITS,
+    ) -> None:
+        self._pose, self._limits, self._beyond = pose, limits, 0
+        self._mesh = mesh if pose.bent or meshed else None
+        if self._mesh is None:
+            return
+        refined = self._mesh.refined
+        scale = 1 << FRACTION_BITS
+        present = pose.present(refined) / scale
+        shown = refined.nodes / scale
+        if pose.places is not None:
+            shown = shown + pose.places / (1 << NODE_BITS)
+        self._corners = present[refined.faces]
+        # Relative to the sample, so that what did not move stays exactly where it was.
+        offset = (shown - present)[refined.faces]
+        a, b, c = (self._corners[:, i] for i in range(3))
+        ab, ac = b - a, c - a
+        area = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]
+        solid = (area != 0)[:, None]
+        self._centres = np.where(solid, self._corners.mean(1), np.inf)
+        safe = np.where(solid, area[:, None], 1)
+        # Weights of b and c at a point p are linear in p - a.
+        self._second = np.stack([ac[:, 1], -ac[:, 0]], 1) / safe
+        self._third = np.stack([-ab[:, 1], ab[:, 0]], 1) / safe
+        self._base, self._to_b, self._to_c = (
+            offset[:, 0], offset[:, 1] - offset[:, 0], offset[:, 2] - offset[:, 0],
+        )  # fmt: skip
+
+    @property
+    def meshed(self) -> bool:
+        """Whether `locate` needs the faces of the samples."""
+        return self._mesh is not None
+
+    def faces(
+        self, origin: Floats, scale: Floats, box: tuple[int, int, int, int]
+    ) -> NDArray[np.int32]:
+        """The face [h, w] at each sample of a rectangle x, y, w, h of samples, or -1.
+
+        Args:
+            origin: Canvas point of sample coordinates 0, 0.
+            scale: Samples a canvas pixel, across and down.
+            box: The rectangle.
+
+        Raises:
+            LimitError: The mesh is folded too often.
+        """
+        corners = (self._corners - origin) * scale
+        # Of a mirrored layer the faces that show are those that showed before.
+        return rasterize(corners[:, ::-1] if self._pose.mirrored else corners, *box, self._limits)
+
+    def locate(self, x: Floats, y: Floats, face: NDArray[np.int32] | None = None) -> Located:
+        """Texture points of canvas points x, y [n], whose faces [n] are given if `meshed`."""
+        if self._mesh is None:
+            if not self._pose.affine:
+                return Located(x, y)
+            a, b, c, d, e, f = self._pose.floats
+            a, b, c, d, _, _ = inverse((a, b, c, d, 0, 0))
+            x, y = x - e, y - f
+            return Located(a * x + c * y, b * x + d * y)
+        assert face is not None, "a meshed layer needs the faces of its samples"
+        at = face.astype(np.int64)
+        lost = np.flatnonzero(at < 0)
+        points = np.stack([x, y], axis=1)
+        self._beyond += len(lost) * len(self._centres)
+        self._limits.check("beyond", self._beyond)
+        at[lost] = nearest(points[lost], self._centres)
+        away = points - self._corners[at, 0]
+        second = (self._second[at] * away).sum(1)
+        third = (self._third[at] * away).sum(1)
+        shown = (
+            points + self._base[at]
+            + second[:, None] * self._to_b[at] + third[:, None] * self._to_c[at]
+        )  # fmt: skip
+        weights = np.stack([1 - second - third, second, third], axis=1)
+        return Located(shown[:, 0], shown[:, 1], at, weights)

@@ -1,0 +1,211 @@
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+import proxyimg_codec as pxi
+from proxyimg_codec import pictures
+
+
+@pytest.fixture
+def work(small_pxi, tmp_path):
+    shutil.copy(small_pxi, tmp_path / "in.pxi")
+    return tmp_path
+
+
+def edited(tool, work, *words):
+    tool("edit", work / "in.pxi", work / "out.pxi", *words, "--force")
+    return pxi.open(work / "out.pxi")
+
+
+FLAGS = [
+    (["--move", "disc", "-4,2.5"], {"op": "move", "layer": "disc", "by": [-4.0, 2.5]}),
+    (["--rotate", "disc", "30"], {"op": "rotate", "layer": "disc", "degrees": 30.0}),
+    (["--rotate", "2", "-30@1,2"],
+     {"op": "rotate", "layer": 2, "degrees": -30.0, "pivot": [1.0, 2.0]}),
+    (["--scale", "disc", "1.5"], {"op": "scale", "layer": "disc", "by": [1.5, 1.5]}),
+    (["--scale", "disc", "1.5,2@0,0"],
+     {"op": "scale", "layer": "disc", "by": [1.5, 2.0], "pivot": [0.0, 0.0]}),
+    (["--shear", "disc", "0.2,0"], {"op": "shear", "layer": "disc", "by": [0.2, 0.0]}),
+    (["--affine", "disc", "1,0,0.1,1,2,3"],
+     {"op": "affine", "layer": "disc", "matrix": [1.0, 0.0, 0.1, 1.0, 2.0, 3.0]}),
+    (["--flip", "disc", "vertical"], {"op": "flip", "layer": "disc", "axis": "vertical"}),
+    (["--drag", "disc", "32,14:-5,1", "32,34:0,0"],
+     {"op": "drag", "layer": "disc", "handles": [[32.0, 14.0, -5.0, 1.0], [32.0, 34.0, 0.0, 0.0]]}),
+    (["--point", "disc", "0,3", "-2,1"],
+     {"op": "point", "layer": "disc", "path": 0, "point": 3, "by": [-2.0, 1.0]}),
+    (["--remove", "disc"], {"op": "remove", "layer": "disc"}),
+    (["--duplicate", "disc"], {"op": "duplicate", "layer": "disc"}),
+    (["--duplicate", "disc=moon"], {"op": "duplicate", "layer": "disc", "name": "moon"}),
+    (["--rename", "disc=sun"], {"op": "rename", "layer": "disc", "name": "sun"}),
+    (["--order", "disc", "1"], {"op": "order", "layer": "disc", "to": 1}),
+    (["--order", "bar", "front"], {"op": "order", "layer": "bar", "to": "front"}),
+    (["--hide", "disc"], {"op": "hide", "layer": "disc"}),
+    (["--opacity", "disc", ".5"], {"op": "opacity", "layer": "disc", "value": 0.5}),
+    (["--texture", "disc=bar"], {"op": "texture", "layer": "disc", "source": "bar"}),
+    (["--texture", "disc=bar@shape"],
+     {"op": "texture", "layer": "disc", "source": "bar", "fit": "shape"}),
+    (["--recolour", "disc", "hue:40,#102030"],
+     {"op": "recolour", "layer": "disc", "hue": 40.0, "tint": "#102030"}),
+    (["--group", "both=disc,1"], {"op": "group", "layers": ["disc", 1], "name": "both"}),
+    (["--parent", "disc=bar"], {"op": "parent", "layer": "disc", "to": "bar"}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("words", "operation"), FLAGS)
+def test_flags_are_operations(tool, work, words, operation):
+    got = edited(tool, work, *words)
+    assert json.loads(got.history[-1].operation) == operation
+    want = pxi.open(work / "in.pxi").edited(operation)
+    assert got.baked().to_bytes() == want.baked().to_bytes()
+    assert got.undone().to_bytes() == (work / "in.pxi").read_bytes()
+
+
+def test_edits_are_done_in_their_order(tool, work):
+    one = edited(tool, work, "--move", "disc", "9,0", "--scale", "disc", "2@0,0")
+    two = edited(tool, work, "--scale", "disc", "2@0,0", "--move", "disc", "9,0")
+    assert one.layers["disc"].pose.shift == (18 << 10, 0)
+    assert two.layers["disc"].pose.shift == (9 << 10, 0)
+
+
+def test_texture_of_a_file(tool, work):
+    other = work / "other.pxi"
+    pxi.open(work / "in.pxi").layers["bar"].renamed("plank").save(other)
+    got = edited(tool, work, "--texture", f"disc={other}:plank")
+    want = pxi.open(work / "in.pxi").layers["disc"].textured("bar")
+    np.testing.assert_array_equal(got.render(), want.render())
+
+
+def test_undo_and_bake(tool, work):
+    edited(tool, work, "--move", "disc", "1,2", "--hide", "bar")
+    tool("edit", work / "out.pxi", work / "back.pxi", "--undo", "2")
+    assert (work / "back.pxi").read_bytes() == (work / "in.pxi").read_bytes()
+    tool("edit", work / "out.pxi", work / "baked.pxi", "--bake")
+    assert not pxi.open(work / "baked.pxi").history
+    went = edited(tool, work, "--move", "disc", "7,8", "--move", "disc", "-7,-8", "--bake")
+    assert went.to_bytes() == (work / "in.pxi").read_bytes()
+
+
+def test_in_place_with_force_and_never_without(tool, work):
+    path = work / "in.pxi"
+    before = path.read_bytes()
+    tool("edit", path, path, "--hide", "disc", code=2)
+    assert path.read_bytes() == before
+    tool("edit", path, path, "--hide", "disc", "--force")
+    assert pxi.open(path).layers["disc"].pose.hidden
+
+
+def test_script(tool, work):
+    script = work / "edits.json"
+    edits = [{"op": "move", "layer": "disc", "by": [1, 2]}, {"op": "hide", "layer": "bar"}]
+    script.write_text(json.dumps({"version": 1, "edits": edits}))
+    got = edited(tool, work, "--script", script)
+    assert [json.loads(s.operation) for s in got.history] == edits
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("{", "JSON"),
+        ("[]", "version"),
+        ('{"version": 2, "edits": []}', "version"),
+        ('{"version": 1}', "edits"),
+        ('{"version": 1, "edits": [], "more": 1}', "nothing else"),
+        ('{"version": 1, "edits": [3]}', "unknown"),
+        ('{"version": 1, "edits": [{"op": "hide", "layer": "cat"}]}', "cat"),
+        ("[" * 100000, "JSON"),
+    ],
+)
+def test_bad_scripts_write_nothing(tool, work, text, said):
+    script = work / "edits.json"
+    script.write_text(text)
+    ran = tool("edit", work / "in.pxi", work / "out.pxi", "--script", script, code=2)
+    assert said in ran.err
+    assert not (work / "out.pxi").exists()
+
+
+def test_list(tool, work):
+    edited(
+        tool, work, "--move", "disc", "4,0", "--group", "both=bar,disc", "--opacity", "disc", ".5"
+    )
+    lines = tool("edit", work / "out.pxi", "--list").out.decode().splitlines()
+    assert lines[0].startswith("0 'back': 64x48 at 0,0")
+    assert "moved" in lines[2]
+    assert "opacity 0.5" in lines[2]
+    assert "in 'both'" in lines[2]
+    assert lines[3] == "group 'both'"
+    assert '"op": "move"' in lines[4]
+    facts = json.loads(tool("edit", work / "out.pxi", "--list", "--json").out)
+    assert [v["name"] for v in facts["layers"]] == ["back", "bar", "disc"]
+    assert facts["groups"] == {"both": None}
+    assert len(facts["history"]) == 3
+
+
+def test_report(tool, work):
+    ran = tool("edit", work / "in.pxi", work / "out.pxi", "--hide", "disc")
+    assert "1 edits to undo" in ran.err
+    assert tool("edit", work / "in.pxi", work / "b.pxi", "--hide", "disc", "--quiet").err == ""
+    facts = json.loads(tool("edit", work / "in.pxi", work / "c.pxi", "--hide", "bar", "--json").out)
+    assert facts["bytes"] == (work / "c.pxi").stat().st_size
+    assert facts["layers"] == ["back", "bar", "disc"]
+
+
+def test_standard_streams(tool, work):
+    data = (work / "in.pxi").read_bytes()
+    out = tool("edit", "-", "-", "--move", "disc", "1,1", stdin=data).out
+    assert pxi.from_bytes(out).layers["disc"].pose.shift == (1024, 1024)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--move", "cat", "1,1"], "no layer 'cat'"),
+        (["--move", "disc", "1"], "--move disc 1: cannot be understood"),
+        (["--move", "disc", "a,b"], "cannot be understood"),
+        (["--scale", "disc", "0"], "singular"),
+        (["--drag", "disc", "1,1"], "cannot be understood"),
+        (["--texture", "disc"], "cannot be understood"),
+        (["--texture", "disc=none.png"], "none.png"),
+        (["--undo", "1"], "has 0"),
+        (["--group", "a=disc", "--group", "b=a", "--group", "a=b"], "part of itself"),
+        (["--frobnicate"], "unrecognized"),
+        (["--move", "disc"], "expected 2 arguments"),
+    ],
+)
+def test_bad_edits_write_nothing(tool, work, words, said):
+    before = (work / "in.pxi").read_bytes()
+    ran = tool("edit", work / "in.pxi", work / "out.pxi", *words, code=2)
+    assert said in ran.err
+    assert not (work / "out.pxi").exists()
+    assert (work / "in.pxi").read_bytes() == before
+
+
+def test_an_output_is_needed_and_not_replaced(tool, work):
+    assert "OUT" in tool("edit", work / "in.pxi", "--hide", "disc", code=2).err
+    (work / "out.pxi").write_bytes(b"old")
+    tool("edit", work / "in.pxi", work / "out.pxi", "--hide", "disc", code=3)
+    assert (work / "out.pxi").read_bytes() == b"old"
+    tool("edit", work / "in.pxi", "-", "--list", code=2)
+    tool("edit", work / "none.pxi", work / "b.pxi", "--hide", "disc", code=3)
+    (work / "bad.pxi").write_bytes(b"no picture")
+    tool("edit", work / "bad.pxi", work / "b.pxi", "--hide", "disc", code=4)
+
+
+def test_outlines_come_back_from_svg(tool, work):
+    tool("decode", work / "in.pxi", work / "shapes.svg")
+    same = edited(tool, work, "--outlines", work / "shapes.svg", "--bake")
+    assert same.to_bytes() == (work / "in.pxi").read_bytes()
+    moved = edited(tool, work, "--move", "disc", "3,1")
+    tool("decode", work / "out.pxi", work / "moved.svg")
+    back = edited(tool, work, "--outlines", work / "moved.svg")
+    want = moved.layers["disc"].outline.paths[0] / 1024
+    got = back.layers["disc"].outline
+    assert np.abs(got.paths[0] / (1 << got.unit) - want).max() <= 1 / 64
+
+
+def test_decoding_shows_the_edit(tool, work):
+    edited(tool, work, "--remove", "disc")
+    tool("decode", work / "out.pxi", work / "out.png")
+    pixels = pictures.read(work / "out.png").pixels
+    assert pixels[24, 32, 0] < 180  # the disc is red

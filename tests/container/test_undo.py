@@ -1,0 +1,135 @@
+import msgpack
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from proxyimg_codec import from_bytes
+from proxyimg_codec.container import meta, undo
+from proxyimg_codec.container.chunks import Chunk, read, write
+from proxyimg_codec.container.fields import pack, unpack
+from proxyimg_codec.container.undo import Step
+from proxyimg_codec.errors import FormatError, LimitError
+from proxyimg_codec.limits import DEFAULT_LIMITS, Limits
+
+PRESENT = [Chunk("HEAD", b"h"), Chunk("LAYR", b"a"), Chunk("LAYR", b"a"), Chunk("TEXR", b"t" * 99)]
+TAIL = Chunk("TAIL", b"")
+
+chunks = st.builds(Chunk, st.sampled_from(["HEAD", "LAYR", "teSt"]), st.binary(max_size=9))
+steps = st.builds(Step, st.text(max_size=9), st.lists(chunks, max_size=6).map(tuple))
+
+
+def decode(chunk, present=PRESENT, limits=DEFAULT_LIMITS):
+    return undo.decode(chunk.payload, present, "chunk uNDO", limits)
+
+
+@given(st.lists(chunks, min_size=1, max_size=6), st.lists(steps, min_size=1, max_size=4))
+def test_histories_come_back(present, history):
+    assert decode(undo.encode(present, history), present) == tuple(history)
+
+
+def test_shared_chunks_are_kept_once():
+    history = [Step("{}", (*PRESENT[:3], Chunk("TEXR", b"u" * 90 + bytes([i % 2])))) for i in "ab"
+               for i in (0, 1, 1)]  # fmt: skip
+    packed = unpack(undo.FIELDS, undo.encode(PRESENT, history).payload, "")
+    assert packed["size"] < 2 * 91 + 6 * 16 + 40
+
+
+def test_a_history_of_another_state_is_ignored_unseen():
+    chunk = undo.encode(PRESENT, [Step("{}", tuple(PRESENT))])
+    assert decode(chunk, [*PRESENT[:-1], Chunk("TEXR", b"other")]) == ()
+    assert decode(chunk, PRESENT[1:]) == ()
+    rubbish = pack(undo.FIELDS, {"state": bytes(32), "size": 9, "zstd": b"rubbish"})
+    assert decode(Chunk("uNDO", rubbish)) == ()
+
+
+def test_a_file_loses_its_history_when_a_stranger_changes_it(small_pxi):
+    image = from_bytes(small_pxi.read_bytes()).edited({"op": "move", "layer": "disc", "by": [1, 2]})
+    data = image.to_bytes()
+    assert len(from_bytes(data).history) == 1
+    parts = read(data)
+    changed = write([*parts[:-2], Chunk("teSt", b""), *parts[-2:]])
+    assert from_bytes(changed).history == ()
+    moved = write([*parts[:-3], parts[-2], parts[-3], parts[-1]])  # uNDO before another chunk
+    assert len(from_bytes(moved).history) == 1
+
+
+def test_steps_refer_to_states_that_open(small_pxi):
+    image = from_bytes(small_pxi.read_bytes())
+    edited = image.edited(
+        {"op": "move", "layer": "disc", "by": [1, 2]}, {"op": "remove", "layer": "bar"}
+    )
+    again = from_bytes(edited.to_bytes())
+    assert again.undone(2).to_bytes() == image.to_bytes()
+    assert [layer.name for layer in again.undone().layers] == ["back", "bar", "disc"]
+
+
+def test_the_oldest_steps_are_forgotten(monkeypatch):
+    history = [Step(str(i), (Chunk("TEXR", bytes([i]) * 50),)) for i in range(9)]
+    monkeypatch.setattr(undo, "STEPS_MAX", 4)
+    assert decode(undo.encode(PRESENT, history)) == tuple(history[-4:])
+    monkeypatch.setattr(undo, "SIZE_MAX", 300)
+    assert decode(undo.encode(PRESENT, history)) == tuple(history[-3:])
+    monkeypatch.setattr(undo, "CHUNKS_MAX", len(PRESENT) + 2)
+    assert decode(undo.encode(PRESENT, history)) == tuple(history[-2:])
+
+
+def test_limits_hold():
+    chunk = undo.encode(PRESENT, [Step("{}", (Chunk("TEXR", bytes(10_000)),))])
+    with pytest.raises(LimitError, match="metadata"):
+        decode(chunk, limits=Limits(metadata_bytes=9999))
+    with pytest.raises(LimitError, match="chunks"):
+        decode(chunk, limits=Limits(chunks=len(PRESENT)))
+
+
+def holding(content, packed=None):
+    """A chunk that is bound to the present state, whatever it holds."""
+    history = msgpack.packb(content, use_bin_type=True) if packed is None else packed
+    values = {
+        "state": undo.digest(PRESENT), "size": len(history), "zstd": meta.compressed(history),
+    }  # fmt: skip
+    return Chunk("uNDO", pack(undo.FIELDS, values))
+
+
+def test_what_the_tests_below_break_is_right():
+    kept, step = ["LAYR", b"x"], ["{}", [0, 4]]
+    want = Step("{}", (PRESENT[0], Chunk("LAYR", b"x")))
+    assert decode(holding({"chunks": [kept], "steps": [step]})) == (want,)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        [], {}, {"chunks": []}, {"steps": [], "chunks": []}, {"chunks": [], "steps": [], "more": 1},
+        {"chunks": [["LAYR", b"x", 1]], "steps": []}, {"chunks": [["LAYR"]], "steps": []},
+        {"chunks": [["LAY", b"x"]], "steps": []}, {"chunks": [["LAYÄ", b"x"]], "steps": []},
+        {"chunks": [["LA1R", b"x"]], "steps": []}, {"chunks": [[b"LAYR", b"x"]], "steps": []},
+        {"chunks": [["LAYR", 1 << 40]], "steps": []}, {"chunks": [["LAYR", [1, 2]]], "steps": []},
+        {"chunks": 5, "steps": []}, {"chunks": [], "steps": 5}, {"chunks": [], "steps": [5]},
+        {"chunks": [], "steps": [["{}"]]}, {"chunks": [], "steps": [[1, [0]]]},
+        {"chunks": [], "steps": [["{}", 0]]}, {"chunks": [], "steps": [["{}", [4]]]},
+        {"chunks": [], "steps": [["{}", [-1]]]}, {"chunks": [], "steps": [["{}", [True]]]},
+        {"chunks": [], "steps": [["{}", ["0"]]]}, {"chunks": [], "steps": [["{}", [0.0]]]},
+        {"chunks": [], "steps": [["{}", []]] * (undo.STEPS_MAX + 1)},
+    ],
+)  # fmt: skip
+def test_corrupt_histories_are_refused(content):
+    with pytest.raises(FormatError, match="corrupt"):
+        decode(holding(content))
+
+
+@pytest.mark.parametrize("packed", [b"\xc1", b"\x82", b"\x91" * 5000, b"\x80\0"])
+def test_what_is_no_map_is_refused(packed):
+    with pytest.raises(FormatError, match="corrupt"):
+        decode(holding(None, packed))
+
+
+def test_other_encodings_are_refused():
+    good = msgpack.packb({"chunks": [], "steps": [["{}", [1]]]}, use_bin_type=True)
+    with pytest.raises(FormatError, match="corrupt"):
+        decode(holding(None, good[:-1] + b"\xcc\x01"))
+
+
+def test_a_damaged_frame_is_refused():
+    values = {"state": undo.digest(PRESENT), "size": 9, "zstd": b"rubbish"}
+    with pytest.raises(FormatError, match="zstd"):
+        decode(Chunk("uNDO", pack(undo.FIELDS, values)))
