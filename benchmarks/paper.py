@@ -1,0 +1,201 @@
+"""The paper's literal texture method beside direct sampling, and its ablations.
+
+    python -m benchmarks.paper DATA [--crops N] [--size N] [--steps N] [--ablations]
+
+DATA is a folder with kodak/ (24 PNG). The crops are central ones of evenly chosen pictures, in
+layers of the built-in decomposition with Chamfer boundaries.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from benchmarks.common import Pixels, centre_crop, header, kodak, read_rgb
+from benchmarks.figures import fit_float
+from proxyimg_codec.encoder import fit_node, node
+from proxyimg_codec.encoder.encode import encode, to_float
+from proxyimg_codec.encoder.layers import Plan, plan_layers
+from proxyimg_codec.encoder.meshes import with_meshes
+from proxyimg_codec.encoder.node import NodeOptions, NodeProblem
+from proxyimg_codec.encoder.problem import build
+from proxyimg_codec.encoder.settings import PRESETS, Settings
+from proxyimg_codec.quality import psnr_8bit
+from proxyimg_codec.texture.network import NetShape
+
+PAPER_CODES, PAPER_PARAMETERS, PAPER_PSNR = 263, 59955, 36.99
+"""What ProxyImg reports, on pictures of its own."""
+
+SETTINGS = Settings(**PRESETS["paper"], jobs=1)
+
+PROBE = 300
+"""Steps that tell how fast direct fitting is."""
+
+EVALUATED = 8192
+"""Pixels evaluated at a time."""
+
+ABLATIONS = {
+    "edge only": NodeOptions(local="none"),
+    "edge + single": NodeOptions(local="single"),
+    "edge + multi (the method)": NodeOptions(),
+    "multi only": NodeOptions(edge=False),
+    "no feature encoding": NodeOptions(octaves=0),
+    "inverse distance inside": NodeOptions(distance=True),
+    "random code a node": NodeOptions(own_codes=True),
+}
+"""The last two cannot be stored in a file."""
+
+
+class Fitted(NamedTuple):
+    """A float fit: PSNR of colours that are not rounded, parameters, CPU seconds."""
+
+    psnr: float
+    parameters: int
+    seconds: float
+
+    def __str__(self) -> str:
+        return f"{self.psnr:6.2f} dB {self.parameters:7d} parameters {self.seconds:6.1f} CPU-s"
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A crop and its layers."""
+
+    name: str
+    pixels: Pixels
+
+    @cached_property
+    def plan(self) -> Plan:
+        """Layers with meshes."""
+        picture = to_float(self.pixels)[0]
+        return with_meshes(picture, plan_layers(picture, SETTINGS, None), SETTINGS)
+
+    def problem(self, options: NodeOptions) -> NodeProblem:
+        """The problem of node sampling."""
+        picture = to_float(self.pixels)[0]
+        outlines = [layer.boundary for layer in self.plan.layers]
+        direct = build(picture, outlines, NetShape(1, 0, 1, 1, 3), np.inf)
+        size = (self.pixels.shape[1], self.pixels.shape[0])
+        return node.build(direct, self.plan.layers, size, options)
+
+    def enlarged(self) -> Case:
+        """The crop reduced to half its size and enlarged again, as it has no pixel's detail."""
+        size = self.pixels.shape[1::-1]
+        small = cv2.resize(self.pixels, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
+        return Case(self.name, cv2.resize(small, size, interpolation=cv2.INTER_CUBIC))
+
+
+def fitted(problem: NodeProblem, steps: int) -> Fitted:
+    """A float fit of the literal method."""
+    started = time.process_time()
+    trainer = fit_node.NodeTrainer(problem, "cpu")
+    state = fit_node.fit_float(problem, trainer, steps, 0)
+    seconds = time.process_time() - started
+    still, total = np.zeros(1, np.float32), 0.0
+    pixels = np.arange(problem.pixels, dtype=np.int32)
+    for part in np.array_split(pixels, -(-len(pixels) // EVALUATED)):
+        total += trainer.run(state, part[None], still, still) * len(part)
+    value = -10 * np.log10(total / len(pixels))
+    return Fitted(value, state.codes.size + state.weights.size, seconds)
+
+
+def cell_of_the_paper(case: Case) -> float:
+    """The size of cells at which the planes have about as many codes as the paper's."""
+    cells = np.geomspace(4, 64, 200)
+    codes = [case.problem(NodeOptions(local="none", cell=cell)).codes for cell in cells]
+    return float(cells[np.abs(np.array(codes) - PAPER_CODES).argmin()])
+
+
+def direct(case: Case, seconds: float) -> Fitted:
+    """Direct sampling with about as many parameters, for as long."""
+    _, _, spent = fit_float(case.pixels, PROBE)
+    return Fitted(*fit_float(case.pixels, max(round(PROBE * seconds / spent), 1)))
+
+
+def table(cases: list[Case], steps: int) -> None:
+    """The paper's figure beside ours."""
+    print(f"\nProxyImg's own: {PAPER_PSNR:6.2f} dB {PAPER_PARAMETERS:7d} parameters, on other "
+          "pictures, which are not published")  # fmt: skip
+    rows: dict[str, list[Fitted]] = {}
+    for case in cases:
+        cell = cell_of_the_paper(case)
+        literal = fitted(case.problem(NodeOptions(cell=cell)), steps)
+        found = {
+            f"literal, about {PAPER_CODES} codes": literal,
+            "literal, o = 8": fitted(case.problem(NodeOptions()), steps),
+            "direct, as many parameters, as long": direct(case, literal.seconds),
+            f"literal, about {PAPER_CODES} codes, enlarged crop": fitted(
+                case.enlarged().problem(NodeOptions(cell=cell)), steps
+            ),
+        }
+        for name, fit in found.items():
+            rows.setdefault(name, []).append(fit)
+            print(f"  {case.name} {name:42} {fit}", flush=True)
+    for name, fits in rows.items():
+        print(f"  mean    {name:42} {np.mean([f.psnr for f in fits]):6.2f} dB")
+
+
+def files(cases: list[Case]) -> None:
+    """Whole files: the paper's preset and the defaults."""
+    print("\nwhole files, --preset paper (4-bit codes and network) and defaults")
+    for case in cases:
+        size = case.pixels.shape[0] * case.pixels.shape[1]
+        for name, options in (("paper", PRESETS["paper"]), ("default", {})):
+            started = time.process_time()
+            image = encode(case.pixels, jobs=1, **options)
+            seconds = time.process_time() - started
+            count = len(image.to_bytes())
+            value = psnr_8bit(case.pixels, image.render()) or 99.0
+            print(f"  {case.name} {name:8} {value:6.2f} dB {count:6d} bytes "
+                  f"{8 * count / size:.3f} bpp {seconds:6.1f} CPU-s", flush=True)  # fmt: skip
+
+
+def ablations(cases: list[Case], steps: int) -> None:
+    """What each part of the method is worth, after equally many steps."""
+    print("\nablations, o = 8")
+    rows: dict[str, list[Fitted]] = {name: [] for name in ABLATIONS}
+    for case in cases:
+        for name, options in ABLATIONS.items():
+            rows[name].append(fitted(case.problem(options), steps))
+            print(f"  {case.name} {name:26} {rows[name][-1]}", flush=True)
+    whole = np.mean([f.psnr for f in rows["edge + multi (the method)"]])
+    for name, fits in rows.items():
+        value = np.mean([f.psnr for f in fits])
+        parameters = np.mean([f.parameters for f in fits])
+        print(f"  mean    {name:26} {value:6.2f} dB ({value - whole:+.2f}), "
+              f"{parameters:.0f} parameters")  # fmt: skip
+
+
+def run(data: Path, crops: int = 4, size: int = 256, steps: int = 2000, parts: bool = True) -> None:
+    """Everything; without the ablations if not `parts`."""
+    chosen = kodak(data)[:: 24 // crops][:crops]
+    cases = [Case(path.stem, centre_crop(read_rgb(path), size)) for path in chosen]
+    print(f"{size}x{size} centre crops of {', '.join(c.name for c in cases)}, {steps} steps")
+    table(cases, steps)
+    files(cases)
+    if parts:
+        ablations(cases, steps)
+
+
+def main() -> None:
+    """Entry point."""
+    p = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    p.add_argument("data", type=Path, help="folder with kodak")
+    p.add_argument("--crops", type=int, default=4, help="number of pictures; default 4")
+    p.add_argument("--size", type=int, default=256, help="side of a crop; default 256")
+    p.add_argument("--steps", type=int, default=2000, help="optimizer steps; default 2000")
+    p.add_argument("--ablations", action="store_true", help="also the ablations")
+    args = p.parse_args()
+    print(header(args.data))
+    run(args.data, args.crops, args.size, args.steps, args.ablations)
+
+
+if __name__ == "__main__":
+    main()
