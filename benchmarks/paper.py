@@ -1,15 +1,18 @@
 """The paper's literal texture method beside direct sampling, and its ablations.
 
-    python -m benchmarks.paper DATA [--crops N] [--size N] [--steps N] [--ablations]
+    python -m benchmarks.paper DATA [--crops N | --names NAME ...] [--size N] [--steps N]
+                                    [--ablations]
 
-DATA is a folder with kodak/ (24 PNG). The crops are central ones of evenly chosen pictures, in
-layers of the built-in decomposition with Chamfer boundaries.
+DATA is a folder with kodak/ (24 PNG). The crops are central ones of evenly chosen pictures, or of
+those named, in layers of the built-in decomposition with Chamfer boundaries.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -25,7 +28,7 @@ from proxyimg_codec.encoder.encode import encode, to_float
 from proxyimg_codec.encoder.layers import Plan, plan_layers
 from proxyimg_codec.encoder.meshes import with_meshes
 from proxyimg_codec.encoder.node import NodeOptions, NodeProblem
-from proxyimg_codec.encoder.problem import build
+from proxyimg_codec.encoder.problem import Problem, build
 from proxyimg_codec.encoder.settings import PRESETS, Settings
 from proxyimg_codec.quality import psnr_8bit
 from proxyimg_codec.texture.network import NetShape
@@ -77,13 +80,25 @@ class Case:
         picture = to_float(self.pixels)[0]
         return with_meshes(picture, plan_layers(picture, SETTINGS, None), SETTINGS)
 
+    @cached_property
+    def start(self) -> Problem:
+        """Pixels and layers, without node sampling."""
+        outlines = [layer.boundary for layer in self.plan.layers]
+        return build(to_float(self.pixels)[0], outlines, NetShape(1, 0, 1, 1, 3), np.inf)
+
     def problem(self, options: NodeOptions) -> NodeProblem:
         """The problem of node sampling."""
-        picture = to_float(self.pixels)[0]
-        outlines = [layer.boundary for layer in self.plan.layers]
-        direct = build(picture, outlines, NetShape(1, 0, 1, 1, 3), np.inf)
         size = (self.pixels.shape[1], self.pixels.shape[0])
-        return node.build(direct, self.plan.layers, size, options)
+        return node.build(self.start, self.plan.layers, size, options)
+
+    def codes(self, cell: float) -> int:
+        """Codes of all planes with cells of that size."""
+        layers = zip(self.start.planes, self.plan.layers, strict=True)
+        several, options = len(self.plan.layers) > 1, NodeOptions(cell=cell)
+        return sum(
+            math.prod(options.grid(plane, several and layer.boundary is None))
+            for plane, layer in layers
+        )
 
     def enlarged(self) -> Case:
         """The crop reduced to half its size and enlarged again, as it has no pixel's detail."""
@@ -108,9 +123,8 @@ def fitted(problem: NodeProblem, steps: int) -> Fitted:
 
 def cell_of_the_paper(case: Case) -> float:
     """The size of cells at which the planes have about as many codes as the paper's."""
-    cells = np.geomspace(4, 64, 200)
-    codes = [case.problem(NodeOptions(local="none", cell=cell)).codes for cell in cells]
-    return float(cells[np.abs(np.array(codes) - PAPER_CODES).argmin()])
+    cells = [float(cell) for cell in np.geomspace(4, 64, 200)]
+    return min(cells, key=lambda cell: abs(case.codes(cell) - PAPER_CODES))
 
 
 def direct(case: Case, seconds: float) -> Fitted:
@@ -173,9 +187,20 @@ def ablations(cases: list[Case], steps: int) -> None:
               f"{parameters:.0f} parameters")  # fmt: skip
 
 
-def run(data: Path, crops: int = 4, size: int = 256, steps: int = 2000, parts: bool = True) -> None:
+def run(
+    data: Path,
+    crops: int = 4,
+    names: Sequence[str] | None = None,
+    size: int = 256,
+    steps: int = 2000,
+    parts: bool = True,
+) -> None:
     """Everything; without the ablations if not `parts`."""
-    chosen = kodak(data)[:: 24 // crops][:crops]
+    chosen = kodak(data)
+    if names:
+        chosen = [path for path in chosen if path.stem in names]
+    else:
+        chosen = chosen[:: 24 // crops][:crops]
     cases = [Case(path.stem, centre_crop(read_rgb(path), size)) for path in chosen]
     print(f"{size}x{size} centre crops of {', '.join(c.name for c in cases)}, {steps} steps")
     table(cases, steps)
@@ -189,12 +214,13 @@ def main() -> None:
     p = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     p.add_argument("data", type=Path, help="folder with kodak")
     p.add_argument("--crops", type=int, default=4, help="number of pictures; default 4")
+    p.add_argument("--names", nargs="+", metavar="NAME", help="pictures instead, as kodim23")
     p.add_argument("--size", type=int, default=256, help="side of a crop; default 256")
     p.add_argument("--steps", type=int, default=2000, help="optimizer steps; default 2000")
     p.add_argument("--ablations", action="store_true", help="also the ablations")
     args = p.parse_args()
     print(header(args.data))
-    run(args.data, args.crops, args.size, args.steps, args.ablations)
+    run(args.data, args.crops, args.names, args.size, args.steps, args.ablations)
 
 
 if __name__ == "__main__":

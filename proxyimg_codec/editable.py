@@ -112,12 +112,12 @@ class Editable:
         values = {"hue": hue, "saturation": saturation, "brightness": brightness, "tint": tint}
         return self._edited("recolour", **values, matrix=None if matrix is None else list(matrix))
 
-    def textured(self, source: str, layer: str | None = None, fit: str = "box") -> Image:
+    def textured(self, source: str, layer: str | int | None = None, fit: str = "box") -> Image:
         """With the texture of something else; its shape stays.
 
         Args:
             source: A layer of this picture; or a `.pxi` file or a picture file, by its name.
-            layer: The layer of that `.pxi` file; its front one by default.
+            layer: A layer of that `.pxi` file, by name or position; its front one by default.
             fit: ``box`` stretches box to box; ``shape`` maps outline to outline.
         """
         return self._edited("texture", source=source, from_layer=layer, fit=fit)

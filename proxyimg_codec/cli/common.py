@@ -59,6 +59,11 @@ def run(prog: str, work: Callable[[], None]) -> int:
     return code
 
 
+def printable(text: str) -> str:
+    """Text of a file for a terminal: nothing in it controls that."""
+    return text if text.isprintable() else ascii(text)
+
+
 def _drop_output() -> None:
     """Forgets output that cannot be written, which Python would complain about at its end."""
     try:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
+import re
 import sys
 import time
 from collections.abc import Callable
@@ -11,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import UsageError
-from .common import check_target, parser, run
+from .common import check_target, parser, printable, run
 from .decode import key
 
 Values = dict[str, Any]
@@ -22,7 +24,7 @@ def arguments() -> argparse.ArgumentParser:
     p = parser(
         "pxi-edit",
         "Edit the layers of a .pxi picture. Edits are repeatable and done in their order; "
-        "NAME is a layer's name or position, or a group's name.",
+        "NAME is a layer's name, or its position from the back (all digits), or a group's name.",
     )
     p.add_argument("input", metavar="IN", help=".pxi file, or - for standard input")
     p.add_argument("output", metavar="OUT", nargs="?", help=".pxi file, - for standard output; "
@@ -82,12 +84,12 @@ def arguments() -> argparse.ArgumentParser:
 def main(argv: list[str] | None = None) -> int:
     """Entry point; returns the exit code."""
     words = sys.argv[1:] if argv is None else argv
-    return run("pxi-edit", lambda: edit_file(arguments().parse_args(_guarded(words))))
+    return run("pxi-edit", lambda: edit_file(arguments().parse_intermixed_args(_guarded(words))))
 
 
 def _guarded(words: list[str]) -> list[str]:
     """Words such as -5,3 with a leading space, so that argparse does not take them for flags."""
-    return [f" {w}" if w[:1] == "-" and w[1:2].isdigit() else w for w in words]
+    return [f" {w}" if re.match(r"-\.?[0-9]", w) else w for w in words]
 
 
 def edit_file(args: argparse.Namespace) -> None:
@@ -101,16 +103,19 @@ def edit_file(args: argparse.Namespace) -> None:
         check_target(args.output, args.force, None if same and args.force else args.input)
     operations = [_parsed(*edit) for edit in args.edits]
 
+    from ..edit.script import apply
     from ..files import write_atomically
     from ..image import open_image
 
     started = time.perf_counter()
-    image = open_image(args.input)
+    image, number = open_image(args.input), 1
     for values in operations:
         if "undo" in values:
             image = image.undone(values["undo"])
-        else:
-            image = image.edited(*values.get("script", [values]))
+            continue
+        edits = values.get("script", [values])
+        image = apply(image, edits, number)
+        number += len(edits)
     if args.bake:
         image = image.baked()
     if args.list:
@@ -146,15 +151,17 @@ def _parsed(flag: str, parse: Callable[..., Values], words: list[str]) -> Values
 
 def listing(image: Any) -> dict[str, Any]:
     """Layers, groups and history, ready for JSON."""
+    from ..edit.geometry import bounds
+
     layers = []
     for i, layer in enumerate(image.layers):
-        pose, shape = layer.pose, layer.outline
-        bounds = [0, 0, image.width, image.height] if shape is None else list(shape.bounds())
+        pose = layer.pose
+        x0, y0, x1, y1 = bounds([layer])
         layers.append(
             {
                 "position": i,
                 "name": layer.name,
-                "bounds": bounds,
+                "bounds": [math.floor(x0), math.floor(y0), math.ceil(x1), math.ceil(y1)],
                 "paths": [] if layer.boundary is None else layer.boundary.segments,
                 "nodes": None if layer.mesh is None else len(layer.mesh.refined.nodes),
                 "moved": pose.affine,
@@ -168,8 +175,16 @@ def listing(image: Any) -> dict[str, Any]:
     return {
         "layers": layers,
         "groups": dict(image.groups),
-        "history": [json.loads(step.operation) for step in image.history],
+        "history": [_recorded(step.operation) for step in image.history],
     }
+
+
+def _recorded(operation: str) -> Any:
+    """An operation of a history; as it is, if another program wrote it in its own way."""
+    try:
+        return json.loads(operation)
+    except (ValueError, RecursionError):
+        return operation
 
 
 def text(facts: dict[str, Any]) -> str:
@@ -188,7 +203,8 @@ def text(facts: dict[str, Any]) -> str:
             + "".join(f", {m}" for m in marks)
         )
     lines += [f"group {n!r}" + (f" in {p!r}" if p else "") for n, p in facts["groups"].items()]
-    lines += [f"edit {i}: {json.dumps(v)}" for i, v in enumerate(facts["history"], 1)]
+    history = (json.dumps(v, ensure_ascii=False) for v in facts["history"])
+    lines += [f"edit {i}: {printable(v)}" for i, v in enumerate(history, 1)]
     return "\n".join(lines)
 
 
@@ -266,9 +282,8 @@ def _texture(text: str) -> Values:
     values: Values = {"op": "texture", "layer": key(layer)}
     if source.endswith("@shape"):
         source, values["fit"] = source.removesuffix("@shape"), "shape"
-    file, colon, name = source.rpartition(":")
-    if colon and file.lower().endswith(".pxi"):
-        return {**values, "source": file, "from_layer": name}
+    if parts := re.fullmatch(r"(.+?\.pxi):(.+)", source, re.IGNORECASE):
+        return {**values, "source": parts[1], "from_layer": key(parts[2])}
     return {**values, "source": source}
 
 

@@ -11,7 +11,7 @@ from typing import Any
 from ..container.chunks import VERSION
 from ..container.file import Container, parse
 from ..files import read_bytes
-from .common import parser, run
+from .common import parser, printable, run
 
 CODERS = {1: "implicit"}
 SAMPLINGS = ("direct", "node", "node, local only", "node, global only")
@@ -151,7 +151,7 @@ def text(f: dict[str, Any]) -> str:
         )
     if f["groups"]:
         lines.append(f"groups: {', '.join(map(repr, f['groups']))}")
-    lines += [f"edit {i}: {text}" for i, text in enumerate(f["edits"], 1)]
+    lines += [f"edit {i}: {printable(v)}" for i, v in enumerate(f["edits"], 1)]
     lines += [f"{name}: {size} bytes" for name, size in f["metadata"].items()]
     if f["encoder"]:
         lines.append(f"made by {f['encoder']!r}, {json.dumps(f['settings'])}")

@@ -36,6 +36,12 @@ def centre(layers: Sequence[Layer]) -> tuple[float, float]:
 
     Sums of such bounds are exact, so that mirroring twice about the centre is too.
     """
+    x0, y0, x1, y1 = bounds(layers)
+    return round((x0 + x1) * _SCALE) / (2 * _SCALE), round((y0 + y1) * _SCALE) / (2 * _SCALE)
+
+
+def bounds(layers: Sequence[Layer]) -> tuple[float, float, float, float]:
+    """x0, y0, x1, y1 of the rectangle round the present outlines of layers, in canvas pixels."""
     points = []
     for layer in layers:
         assert layer.image is not None
@@ -45,8 +51,8 @@ def centre(layers: Sequence[Layer]) -> tuple[float, float]:
         else:
             points.append(sampled(shape))
     every = np.concatenate(points)
-    x, y = np.rint((every.min(0) + every.max(0)) * _SCALE) / (2 * _SCALE)
-    return float(x), float(y)
+    (x0, y0), (x1, y1) = every.min(0).tolist(), every.max(0).tolist()
+    return x0, y0, x1, y1
 
 
 def sampled(boundary: Boundary) -> NDArray[np.float64]:
@@ -153,7 +159,7 @@ def meshed(layer: Layer) -> Layer:
 @operation(
     "drag",
     layer="layer: a layer's name or position",
-    handles="handles: a list of x, y, dx, dy: points of the layer and where they go",
+    handles="handles: a list of 1 to 500 x, y, dx, dy: points of the layer and where they go",
 )
 def drag(image: Image, layer: str | int, handles: Sequence[Sequence[float]]) -> Image:
     """Bends a layer so that points of it move; a point with 0, 0 stays."""
@@ -209,23 +215,14 @@ def point(image: Image, layer: str | int, path: int, point: int, by: Pair) -> Im
 def outlines(image: Image, source: str) -> Image:
     """Takes the boundaries of layers from an SVG file, such as `pxi-decode` writes."""
     from ..files import read_bytes
-    from .outlines import load
+    from .outlines import load, same
 
     new = []
     for name, shape in load(image, read_bytes(source), source).items():
         layer = one(image, name)
-        if not _same(shape, layer.outline):
+        if layer.outline is None or not same(shape, layer.outline):
             new.append(replace(layer, boundary=_at_rest(layer, shape)))
     return substituted(image, new)
-
-
-def _same(a: Boundary, b: Boundary | None) -> bool:
-    """Whether two outlines have the same control points."""
-    if b is None or [len(p) for p in a.paths] != [len(p) for p in b.paths]:
-        return False
-    return all(
-        np.array_equal(p << b.unit, q << a.unit) for p, q in zip(a.paths, b.paths, strict=True)
-    )
 
 
 def _at_rest(layer: Layer, shape: Boundary) -> Boundary:

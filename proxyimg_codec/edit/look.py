@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import PxiError, UsageError
+from ..errors import InputError, PxiError, UsageError
 from ..geometry.boundary import Boundary
 from ..geometry.mesh import FRACTION_BITS
 from ..geometry.pose import COLOUR_BITS, COLOUR_MAX, NODE_BITS, NODE_MAX, OPACITY_MAX
+from ..geometry.warp import WEIGHT_BITS, barycentric
 from ..image import Image, Layer, open_image
 from .geometry import TARGET, meshed, sampled
 from .operations import changed, one, operation, shown_together, substituted
@@ -103,10 +103,14 @@ def _hue(degrees: float) -> Reals:
 
 @operation("texture", layer="layer: the layer that changes, by name or position",
            source="text: a layer of this picture, or the name of a .pxi or picture file",
-           from_layer="text?: the layer of that .pxi file; its front one by default",
+           from_layer="layer?: a layer of that .pxi file; its front one by default",
            fit="fit?: box to box, or by the shape of the outlines")  # fmt: skip
 def texture(
-    image: Image, layer: str | int, source: str, from_layer: str | None = None, fit: str = "box"
+    image: Image,
+    layer: str | int,
+    source: str,
+    from_layer: str | int | None = None,
+    fit: str = "box",
 ) -> Image:
     """Gives a layer the texture of another layer, of another file's layer, or of a picture."""
     target = one(image, layer)
@@ -119,28 +123,44 @@ def texture(
     else:
         origin = _loaded(source, from_layer)
         assert origin.image is not None
-        networks.append(origin.image.networks[origin.texture.network])
-        shown = replace(origin.texture, network=len(networks) - 1)
+        brought = origin.image.networks[origin.texture.network]
+        same = (i for i, v in enumerate(networks) if v.packed == brought.packed)
+        number = next(same, len(networks))
+        if number == len(networks):
+            networks.append(brought)
+        shown = replace(origin.texture, network=number)
+    if origin.sampling and fit == "shape":
+        raise UsageError(
+            f"texture: layer {origin.name!r} has its features at its own nodes, which do not fit "
+            "the outline of another layer; stretch it box to box"
+        )
     if origin.sampling and target.mesh is None:
         target = meshed(target)
     new = replace(target, texture=shown, sampling=origin.sampling)
-    new = replace(new, pose=replace(new.pose, places=None))
-    if fit == "shape":
-        new = _fitted(new, origin)
+    if fit == "shape" or origin.pose.places is not None:
+        new = _placed(new, origin, fit)
+    else:
+        new = replace(new, pose=replace(new.pose, places=None))
     layers = [new if v.name == target.name else v for v in image.layers]
     return changed(image, layers, networks=networks)
 
 
-def _loaded(source: str, name: str | None) -> Layer:
+def _loaded(source: str, name: str | int | None) -> Layer:
     """The layer of a `.pxi` file, or a picture file as one layer.
 
     Raises:
         UsageError: There is no such file.
+        InputError: It cannot be read.
     """
-    if not Path(source).is_file():
-        raise UsageError(f"texture: {source!r} is neither a layer of the picture nor a file")
-    with open(source, "rb") as file:
-        known = file.read(4) == b"\x89PXI"
+    try:
+        with open(source, "rb") as file:
+            known = file.read(4) == b"\x89PXI"
+    except (FileNotFoundError, UnicodeError):
+        raise UsageError(
+            f"texture: {source!r} is neither a layer of the picture nor a file"
+        ) from None
+    except OSError as error:
+        raise InputError(f"{source}: cannot be read: {error.strerror}") from None
     if known:
         layers = open_image(source).layers
         return layers[-1 if name is None else name]  # type: ignore[no-any-return]  # untyped key
@@ -158,27 +178,44 @@ def _loaded(source: str, name: str | None) -> Layer:
     return encode(pixels, max_layers=1).layers[0]  # type: ignore[no-any-return]  # untyped key
 
 
-def _fitted(layer: Layer, origin: Layer) -> Layer:
-    """`layer` showing the texture of `origin` so that outlines meet.
-
-    Polar: a node at direction t from the centre of its shape, at a share r of the way to the
-    outline, shows the point at direction t and share r in the shape of `origin`.
-    """
+def _placed(layer: Layer, origin: Layer, fit: str) -> Layer:
+    """`layer`, whose texture is that of `origin`, with nodes that show what `origin` shows."""
     layer = meshed(layer)
     assert layer.mesh is not None
+    rest = layer.mesh.refined.nodes / (1 << FRACTION_BITS)
+    here, there = (np.array(v.box, float).reshape(2, 2) for v in (layer, origin))
+    scale = here[1] / there[1]
+    points = (
+        _matched(rest, layer, origin) if fit == "shape" else there[0] + (rest - here[0]) / scale
+    )
+    if origin.pose.places is not None:
+        assert origin.mesh is not None
+        refined = origin.mesh.refined
+        fixed = np.rint(points * (1 << FRACTION_BITS)).astype(np.int64)
+        face, weights = barycentric(fixed, refined.nodes, refined.faces)
+        corners = origin.pose.places[refined.faces[face]]
+        points += (weights[..., None] * corners).sum(1) / (1 << (WEIGHT_BITS + NODE_BITS))
+    # The box of a layer never changes: the plane is stretched over it.
+    shown = here[0] + (points - there[0]) * scale
+    places = np.rint((shown - rest) * (1 << NODE_BITS))
+    places = np.clip(places, 1 - NODE_MAX, NODE_MAX - 1).astype(np.int64)
+    return replace(layer, pose=replace(layer.pose, places=places if places.any() else None))
+
+
+def _matched(points: Reals, layer: Layer, origin: Layer) -> Reals:
+    """Points [N, 2] of a layer in the shape of another, so that outlines meet.
+
+    Polar: a point at direction t from the centre of its shape, at a share r of the way to the
+    outline, becomes the point at direction t and share r in the shape of `origin`.
+    """
     assert layer.image is not None
     assert origin.image is not None
     here = _Star(layer.boundary, (layer.image.width, layer.image.height))
     there = _Star(origin.boundary, (origin.image.width, origin.image.height))
-    rest = layer.mesh.refined.nodes / (1 << FRACTION_BITS)
-    away = rest - here.centre
+    away = points - here.centre
     angle = np.arctan2(away[:, 1], away[:, 0])
     ratio = there.reach(angle) / here.reach(angle)
-    shown = there.centre + away * ratio[:, None]
-    places = np.rint((shown - rest) * (1 << NODE_BITS))
-    places = np.clip(places, 1 - NODE_MAX, NODE_MAX - 1).astype(np.int64)
-    pose = replace(layer.pose, places=places if places.any() else None)
-    return replace(layer, box=origin.box, pose=pose)
+    return np.asarray(there.centre + away * ratio[:, None])
 
 
 class _Star:

@@ -13,6 +13,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from ..container.undo import Step
 from ..errors import UsageError
 from ..geometry.pose import OPACITY_MAX
@@ -21,22 +23,35 @@ from ..texture.network import Network
 
 NAME_MAX = 200
 
+NUMBER_MAX = 1e12
+"""Largest magnitude of a number: products of a few still have room in double precision."""
+
+HANDLES_MAX = 500
+"""Most handles of a drag, whose time grows with their cube: some seconds."""
+
+NUMBER = {"type": "number", "minimum": -NUMBER_MAX, "maximum": NUMBER_MAX}
+
 
 def _numbers(count: int) -> dict[str, Any]:
-    return {"type": "array", "items": {"type": "number"}, "minItems": count, "maxItems": count}
+    return {"type": "array", "items": NUMBER, "minItems": count, "maxItems": count}
 
 
 KINDS: dict[str, dict[str, Any]] = {
     "layer": {"type": ["string", "integer"]},
     "layers": {"type": "array", "items": {"type": ["string", "integer"]}, "minItems": 1},
-    "number": {"type": "number"},
+    "number": NUMBER,
     "integer": {"type": "integer"},
     "place": {"type": ["integer", "string"]},
     "pair": _numbers(2),
     "matrix": _numbers(6),
     "colours": _numbers(12),
-    "handles": {"type": "array", "items": _numbers(4), "minItems": 1},
-    "text": {"type": "string"},
+    "handles": {
+        "type": "array",
+        "items": _numbers(4),
+        "minItems": 1,
+        "maxItems": HANDLES_MAX,
+    },
+    "text": {"type": "string", "pattern": r"^[^\0]*$"},
     "axis": {"enum": ["horizontal", "vertical"]},
     "fit": {"enum": ["box", "shape"]},
     "colour": {"type": "string", "pattern": "^#[0-9a-fA-F]{6}$"},
@@ -92,19 +107,30 @@ def run(image: Image, values: Mapping[str, Any]) -> Image:
     if not isinstance(name, str) or name not in OPERATIONS:
         raise UsageError(f"operation {name!r} is unknown; there are {', '.join(OPERATIONS)}")
     chosen = OPERATIONS[name]
-    given = {k: v for k, v in values.items() if k != "op"}
+    given = {k: _plain(v) for k, v in values.items() if k != "op"}
     for key in given:
         if key not in chosen.parameters:
             known = ", ".join(chosen.parameters)
             raise UsageError(f"{name}: parameter {key!r} is unknown; there are {known}")
     for key, parameter in chosen.parameters.items():
         if key in given and not _fits(given[key], KINDS[parameter.kind]):
-            raise UsageError(f"{name}: {key} is {given[key]!r}; it must be {parameter.meaning}")
+            value = repr(given[key])
+            shown = value if len(value) <= 80 else f"{value[:77]}..."
+            raise UsageError(f"{name}: {key} is {shown}; it must be {parameter.meaning}")
         if key not in given and parameter.needed:
             raise UsageError(f"{name}: {key} is missing; it must be {parameter.meaning}")
     result = chosen.apply(image, **given)
-    step = Step(json.dumps({"op": name, **given}, ensure_ascii=False), image.chunks)
+    text = json.dumps({"op": name, **given}, ensure_ascii=False)
+    # Names of files may hold what UTF-8 cannot; written like this it is JSON again.
+    step = Step(text.encode(errors="backslashreplace").decode(), image.chunks)
     return replace(result, history=(*image.history, step))
+
+
+def _plain(value: Any) -> Any:
+    """A value with numbers and arrays of numpy as those of Python."""
+    if isinstance(value, (list, tuple)):
+        return [_plain(v) for v in value]
+    return value.tolist() if isinstance(value, (np.generic, np.ndarray)) else value
 
 
 def _fits(value: Any, schema: Mapping[str, Any]) -> bool:
@@ -116,11 +142,10 @@ def _fits(value: Any, schema: Mapping[str, Any]) -> bool:
         return False
     if isinstance(value, str):
         return "string" in types and re.search(schema.get("pattern", ""), value) is not None
-    if isinstance(value, int):
-        return "integer" in types or "number" in types
-    if isinstance(value, float):
-        return "number" in types and math.isfinite(value)
-    if isinstance(value, (list, tuple)) and "array" in types:
+    if isinstance(value, (int, float)):
+        within = -schema.get("maximum", math.inf) <= value <= schema.get("maximum", math.inf)
+        return within and ("number" in types or ("integer" in types and isinstance(value, int)))
+    if isinstance(value, list) and "array" in types:
         low, high = schema.get("minItems", 0), schema.get("maxItems", math.inf)
         return low <= len(value) <= high and all(_fits(v, schema["items"]) for v in value)
     return False

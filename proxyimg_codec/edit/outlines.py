@@ -121,7 +121,7 @@ def _boundary(curves: list[Points], layer: Layer, image: Image, where: str) -> B
             return None
         if image.opaque and layer is image.layers[0]:
             raise InputError(f"{where}: the back layer covers the whole canvas and stays so")
-    elif present.unit > UNITS[0] and _same(_in_unit(present.unit, curves), present):
+    elif present.unit > UNITS[0] and same(_in_unit(present.unit, curves), present):
         return None
     return result
 
@@ -137,7 +137,9 @@ def _in_unit(unit: int, curves: list[Points]) -> Boundary:
     return Boundary(unit, tuple(paths))
 
 
-def _same(one: Boundary, other: Boundary) -> bool:
+def same(one: Boundary, other: Boundary) -> bool:
+    """Whether two outlines have the same control points, in whatever units."""
     return one.segments == other.segments and all(
-        (p == q).all() for p, q in zip(one.paths, other.paths, strict=True)
+        (p << other.unit == q << one.unit).all()
+        for p, q in zip(one.paths, other.paths, strict=True)
     )

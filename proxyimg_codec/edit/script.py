@@ -17,13 +17,13 @@ from .operations import KINDS, OPERATIONS, run
 __all__ = ["OPERATIONS", "apply", "geometry", "look", "parse", "schema", "structure"]
 
 
-def apply(image: Image, operations: Iterable[Mapping[str, Any]]) -> Image:
-    """The image after all `operations`, in order.
+def apply(image: Image, operations: Iterable[Mapping[str, Any]], first: int = 1) -> Image:
+    """The image after all `operations`, in order; errors count them from `first`.
 
     Raises:
         UsageError: One of them is unknown or cannot be done; it says which.
     """
-    for number, values in enumerate(operations, 1):
+    for number, values in enumerate(operations, first):
         try:
             image = run(image, values)
         except PxiError as error:

@@ -10,15 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import plugins
+from ..edit.geometry import EDGE_BACK, EDGE_FRONT
 from ..geometry.boundary import Boundary
 from ..geometry.mesh import FRACTION_BITS, Base, Mesh
 from ..geometry.raster import rasterize
 from ..texture.network import Floats
 from .layers import Plan
 from .settings import Settings
-
-EDGE_FRONT, EDGE_BACK = 0.05, 0.2
-"""Edge lengths relative to a layer's diagonal (ProxyImg, l_r^f and l_r^b)."""
 
 HIERARCHIES_FRONT, HIERARCHIES_BACK = 3, 2
 """Hierarchies, the base included (ProxyImg, h_f and h_b)."""
