@@ -37,11 +37,11 @@ def arguments() -> argparse.ArgumentParser:
             def __call__(self, parser: Any, space: Any, values: Any, option: Any = None) -> None:
                 space.edits = [*space.edits, (flag, parse, list(values))]
 
-        count: int | str = "+" if names[-1].endswith("...") else len(names)
+        count: int | str = "+" if names[-1].endswith(" ...") else len(names)
         shown = tuple(n.removesuffix(" ...") for n in names)
         edits.add_argument(
             flag, action=Gather, nargs=count, default=argparse.SUPPRESS, help=help,
-            metavar=shown if isinstance(count, int) else (shown[0], " ".join(shown[1:]) + " ..."),
+            metavar=shown,
         )  # fmt: skip
 
     add("--move", _geometry("move", by=2), "NAME", "DX,DY", help="move by canvas pixels")

@@ -204,3 +204,7 @@ def test_the_output_may_stand_after_the_edits(tool, small_pxi, tmp_path):
     tool("edit", "--hide", "bar", small_pxi, "-f", out)
     assert [v.pose.hidden for v in pxi.open(out).layers] == [False, True, False]
     tool("edit", small_pxi, out, out, "--hide", "bar", code=2)
+    tool("edit", small_pxi, "--group", "both=bar,disc", tmp_path / "grouped.pxi")
+    usage = " ".join(tool("edit", "--help").out.decode().split())
+    assert "[--group NAME=A,B,...]" in usage
+    assert "[--drag NAME [X,Y:DX,DY ...]]" in usage
