@@ -97,7 +97,7 @@ def outline(boundary: Boundary | None, size: tuple[int, int], edge: float) -> Ou
     length = max(edge * math.hypot(width, height), SHORTEST)
     # So far from a slanting line are the steps of the cells that stand for it.
     stairs = width * height / math.hypot(width, height) / CELLS
-    tolerance, padding = max(1.5 * stairs, min(length / 10, SHORTEST)), PADDING
+    tolerance, padding = max(1.5 * stairs, min(length / 8, SHORTEST)), PADDING
     for _ in range(ROUNDS):
         found = _outline(boundary, box, padding, tolerance, length)
         if found.triangles <= triangles_max(edge):
