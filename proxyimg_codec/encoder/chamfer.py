@@ -74,6 +74,7 @@ def _descend(
     """Fit one closed path to contour points [n, 2], all in long sides; returns [3m, 2]."""
     import torch
 
+    torch.set_num_threads(1)  # for so little work threads that wait for each other cost most
     target = torch.from_numpy(contour).float()
     count = 3 * min(segments, max(2, len(contour) // 3))
     control = target[torch.arange(count) * len(target) // count]
