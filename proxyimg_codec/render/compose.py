@@ -201,9 +201,8 @@ def premultiplied(output: Floats) -> Floats:
     Outputs that are not numbers count as 0. Colour is in 0..1; with a fourth output alpha is in
     0..1 and colour in 0..alpha.
     """
-    result = np.ones((len(output), 4), np.float32)
-    if output.shape[1] == 4:
-        result[:, 3] = np.fmin(np.fmax(output[:, 3], 0), 1)
+    result = np.empty((len(output), 4), np.float32)
+    result[:, 3] = np.fmin(np.fmax(output[:, 3], 0), 1) if output.shape[1] == 4 else 1
     for k in range(3):
         # Unlike clip, fmax takes the number where the other is none.
         np.fmin(np.fmax(output[:, k], 0), result[:, 3], out=result[:, k])
