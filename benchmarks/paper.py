@@ -138,16 +138,17 @@ def table(cases: list[Case], steps: int) -> None:
     print(f"\nProxyImg's own: {PAPER_PSNR:6.2f} dB {PAPER_PARAMETERS:7d} parameters, on other "
           "pictures, which are not published")  # fmt: skip
     rows: dict[str, list[Fitted]] = {}
+    few = f"literal, about {PAPER_CODES} codes"
     for case in cases:
-        cell = cell_of_the_paper(case)
-        literal = fitted(case.problem(NodeOptions(cell=cell)), steps)
+        literal, enlarged = (
+            fitted(c.problem(NodeOptions(cell=cell_of_the_paper(c))), steps)
+            for c in (case, case.enlarged())
+        )
         found = {
-            f"literal, about {PAPER_CODES} codes": literal,
+            few: literal,
+            f"{few}, enlarged crop": enlarged,
             "literal, o = 8": fitted(case.problem(NodeOptions()), steps),
             "direct, as many parameters, as long": direct(case, literal.seconds),
-            f"literal, about {PAPER_CODES} codes, enlarged crop": fitted(
-                case.enlarged().problem(NodeOptions(cell=cell)), steps
-            ),
         }
         for name, fit in found.items():
             rows.setdefault(name, []).append(fit)
