@@ -1,0 +1,1 @@
+"""Rate–distortion benchmarks against other codecs; needs the ``bench`` extra."""

@@ -1,0 +1,239 @@
+"""The codecs that are compared: a table with one entry each."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import __version__
+from ..errors import UsageError
+
+Pixels = NDArray[np.uint8]
+
+EFFORT, FAST_EFFORT = 5, 2
+"""Efforts of our own codec: the default, and that of ``pxi-fast``."""
+
+
+@dataclass(frozen=True)
+class Codec:
+    """One codec with fixed settings.
+
+    Everything in it can be pickled, for it is called in other processes.
+
+    Attributes:
+        name: What the command line and the tables call it.
+        label: What plots call it.
+        settings: What is fixed, in words.
+        qualities: Qualities by default, in the codec's own measure; on photographs they lead to
+            0.1 to 1.5 bits a pixel.
+        limits: Least and greatest quality.
+        encode: The whole file of uint8 [H, W, 3 or 4] at a quality; takes ``masks`` if the field
+            of that name is set.
+        decode: uint8 [H, W, 3 or 4] of a file.
+        version: Version of the libraries behind it.
+        whole: Qualities are whole numbers.
+        alpha: It can code transparency.
+        masks: It codes the layers of label maps.
+        default: It runs if the command line does not name codecs.
+    """
+
+    name: str
+    label: str
+    settings: str
+    qualities: tuple[float, ...]
+    limits: tuple[float, float]
+    encode: Callable[..., bytes]
+    decode: Callable[[bytes], Pixels]
+    version: Callable[[], str]
+    whole: bool = False
+    alpha: bool = True
+    masks: bool = False
+    default: bool = True
+
+    def checked(self, quality: float) -> float:
+        """The quality, if the codec knows it.
+
+        Raises:
+            UsageError: It is out of range, or should be a whole number.
+        """
+        low, high = self.limits
+        if not low <= quality <= high or (self.whole and quality != round(quality)):
+            kind = "a whole number" if self.whole else "a number"
+            raise UsageError(
+                f"quality {quality:g} of {self.name} must be {kind} from {low:g} to {high:g}"
+            )
+        return quality
+
+
+def pillow_encode(pixels: Pixels, quality: float, *, kind: str, **options: Any) -> bytes:
+    """A file of one of Pillow's formats."""
+    from PIL import Image
+
+    file = io.BytesIO()
+    Image.fromarray(pixels).save(file, kind, quality=int(quality), **options)
+    return file.getvalue()
+
+
+def jpeg2000_encode(pixels: Pixels, quality: float) -> bytes:
+    """A JPEG 2000 file of `quality` bits a pixel: 9/7 wavelet, colour transform."""
+    from PIL import Image
+
+    file = io.BytesIO()
+    ratio = 8 * pixels.shape[2] / quality
+    Image.fromarray(pixels).save(
+        file, "JPEG2000", quality_mode="rates", quality_layers=[ratio], irreversible=True, mct=1
+    )
+    return file.getvalue()
+
+
+def pillow_decode(data: bytes) -> Pixels:
+    """The picture in a file that Pillow reads."""
+    from PIL import Image
+
+    with Image.open(io.BytesIO(data)) as image:
+        kind = "RGBA" if image.has_transparency_data else "RGB"
+        return np.asarray(image.convert(kind))
+
+
+def jpegxl_encode(pixels: Pixels, quality: float) -> bytes:
+    """A JPEG XL file at libjxl's quality."""
+    import imagecodecs
+
+    return bytes(imagecodecs.jpegxl_encode(pixels, int(quality), effort=7, numthreads=1))
+
+
+def jpegxl_decode(data: bytes) -> Pixels:
+    """The picture in a JPEG XL file."""
+    import imagecodecs
+
+    return np.asarray(imagecodecs.jpegxl_decode(data, numthreads=1), np.uint8)
+
+
+def pxi_encode(
+    pixels: Pixels, quality: float, *, masks: Sequence[Any] | None = None, **options: Any
+) -> bytes:
+    """A .pxi file, on one thread; of one layer if there are no masks."""
+    from ..encoder.encode import encode
+
+    if masks is None:
+        options["max_layers"] = 1
+    image = encode(pixels, masks=masks, quality=quality, jobs=1, **options)
+    return image.to_bytes()
+
+
+def pxi_decode(data: bytes) -> Pixels:
+    """The picture in a .pxi file."""
+    from ..image import from_bytes
+
+    return np.asarray(from_bytes(data).render())
+
+
+def pillow_version(feature: str) -> str:
+    """Pillow's version and that of the library behind a format."""
+    from PIL import __version__ as pillow
+    from PIL import features
+
+    library = features.version(feature)
+    if feature == "avif":
+        from PIL import _avif
+
+        library = f"{library} ({_avif.codec_versions()})"
+    return f"Pillow {pillow}, {feature} {library}"
+
+
+def jpegxl_version() -> str:
+    """Version of libjxl."""
+    import imagecodecs
+
+    return f"imagecodecs {imagecodecs.__version__}, {imagecodecs.jpegxl_version()}"
+
+
+def pxi_version() -> str:
+    """Version of this package with a hash of its code and weights, which change between releases.
+
+    Measurements are reused only if it agrees.
+    """
+    root, hasher = Path(__file__).parents[1], hashlib.sha256()
+    apart = {"__pycache__", "bench", "cli", "edit", "export"}
+    for path in sorted(root.rglob("*")):
+        if path.is_file() and not apart & set(path.relative_to(root).parts):
+            hasher.update(path.read_bytes())
+    return f"proxyimg-codec {__version__}+{hasher.hexdigest()[:10]}"
+
+
+AVIF_QUALITIES = {
+    "4:2:0": (8.0, 22.0, 34.0, 44.0, 54.0, 64.0, 75.0),
+    "4:4:4": (7.0, 20.0, 32.0, 42.0, 51.0, 60.0, 72.0),
+}
+
+PXI_QUALITIES = (10.0, 25.0, 40.0, 50.0, 60.0, 75.0, 90.0)
+
+
+def avif(name: str, label: str, speed: int, subsampling: str, default: bool = True) -> Codec:
+    """AVIF by libaom, tuned for PSNR: what Pillow does by default is tuned for the eye."""
+    encode = partial(
+        pillow_encode, kind="AVIF", codec="aom", speed=speed, subsampling=subsampling,
+        advanced={"tune": "psnr"}, max_threads=1, autotiling=False,
+    )  # fmt: skip
+    settings = f"libaom, speed {speed}, {subsampling}, tune=psnr"
+    return Codec(
+        name, label, settings, AVIF_QUALITIES[subsampling], (0, 99), encode, pillow_decode,
+        partial(pillow_version, "avif"), whole=True, default=default,
+    )  # fmt: skip
+
+
+def pxi(
+    name: str, label: str, effort: int, texture: str = "pyramid", *,
+    masks: bool = False, default: bool = True,
+) -> Codec:  # fmt: skip
+    """Our own codec."""
+    layers = "layers of the label maps" if masks else "one layer"
+    return Codec(
+        name, label, f"{texture}, effort {effort}, {layers}", PXI_QUALITIES, (0, 100),
+        partial(pxi_encode, texture=texture, effort=effort), pxi_decode, pxi_version,
+        masks=masks, default=default,
+    )  # fmt: skip
+
+
+def codecs(effort: int = EFFORT) -> dict[str, Codec]:
+    """All codecs by name, in the order of the tables; `effort` is that of ours."""
+    table = [
+        Codec(
+            "jpeg", "JPEG", "4:2:0, optimized Huffman tables",
+            (4, 9, 18, 34, 55, 70, 79), (0, 100),
+            partial(pillow_encode, kind="JPEG", subsampling="4:2:0", optimize=True),
+            pillow_decode, partial(pillow_version, "libjpeg_turbo"), whole=True, alpha=False,
+        ),
+        Codec(
+            "webp", "WebP", "lossy, method 6",
+            (0, 3, 15, 38, 62, 77, 86), (0, 100),
+            partial(pillow_encode, kind="WEBP", method=6),
+            pillow_decode, partial(pillow_version, "webp"), whole=True,
+        ),
+        Codec(
+            "jp2", "JPEG 2000", "OpenJPEG by rate, quality is bits a pixel",
+            (0.1, 0.2, 0.35, 0.55, 0.8, 1.1, 1.5), (0.01, 24),
+            jpeg2000_encode, pillow_decode, partial(pillow_version, "jpg_2000"),
+        ),
+        Codec(
+            "jxl", "JPEG XL", "lossy, effort 7",
+            (1, 12, 30, 52, 70, 80, 86), (0, 99),
+            jpegxl_encode, jpegxl_decode, jpegxl_version, whole=True,
+        ),
+        avif("avif420", "AVIF 4:2:0", 4, "4:2:0"),
+        avif("avif444", "AVIF 4:4:4", 4, "4:4:4"),
+        avif("avif420-s0", "AVIF 4:2:0 speed 0", 0, "4:2:0", default=False),
+        pxi("pxi-fast", "pxi fast", FAST_EFFORT),
+        pxi("pxi", "pxi", effort),
+        pxi("pxi-masks", "pxi with layers", effort, masks=True, default=False),
+        pxi("pxi-implicit", "pxi implicit", effort, "implicit", default=False),
+    ]  # fmt: skip
+    return {codec.name: codec for codec in table}

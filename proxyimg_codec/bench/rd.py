@@ -1,0 +1,246 @@
+"""Every picture by every codec at every quality, in processes of their own."""
+
+from __future__ import annotations
+
+import hashlib
+import multiprocessing
+import os
+import platform
+import time
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import pictures
+from ..errors import InputError, LimitError, PxiError, UsageError
+from .peers import Codec
+from .rows import Row
+
+Pixels = NDArray[np.uint8]
+
+SUFFIXES = (".png", ".webp", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".ppm", ".jp2", ".npy")
+"""Suffixes of files that are taken for pictures."""
+
+ONE_THREAD = dict.fromkeys(
+    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS"), "1"
+)
+
+
+@dataclass(frozen=True)
+class Source:
+    """A picture of the folder.
+
+    Attributes:
+        path: Its file.
+        width: In pixels.
+        height: In pixels.
+        alpha: Some of it is transparent.
+        digest: Hash of its pixels.
+        masks: Its label map, or folder of masks; None if it has none.
+    """
+
+    path: Path
+    width: int
+    height: int
+    alpha: bool
+    digest: str
+    masks: Path | None = None
+
+
+@dataclass(frozen=True)
+class Task:
+    """One encode and decode."""
+
+    source: Source
+    codec: Codec
+    version: str
+    quality: float
+
+
+@dataclass(frozen=True)
+class Failure:
+    """What went wrong with a task."""
+
+    message: str
+
+
+def find(folder: Path, chosen: str | None = None, masks: Path | None = None) -> list[Source]:
+    """The pictures of a folder by name.
+
+    Args:
+        folder: Where to look; not in folders inside it.
+        chosen: How many from the first, or names without suffix between commas; None = all.
+        masks: Folder with a label map ``NAME.png`` or a folder of masks ``NAME`` for some.
+
+    Raises:
+        InputError: No folder, no pictures, or a damaged one.
+        UsageError: A chosen picture is not there.
+    """
+    for place in (folder, masks):
+        if place is not None and not place.is_dir():
+            raise InputError(f"{place}: is not a folder")
+    files = sorted(p for p in folder.iterdir() if p.suffix.lower() in SUFFIXES and p.is_file())
+    if not files:
+        raise InputError(f"{folder}: holds no pictures ({', '.join(SUFFIXES)})")
+    names = [p.stem for p in files]
+    if len(set(names)) < len(names):
+        twin = next(n for n in names if names.count(n) > 1)
+        raise InputError(f"{folder}: two pictures are called {twin}; rename one")
+    if chosen is not None and chosen.isdecimal():
+        if int(chosen) == 0:
+            raise UsageError("--images 0: at least one picture is needed")
+        files = files[: int(chosen)]
+    elif chosen is not None:
+        wanted = chosen.split(",")
+        unknown = [n for n in wanted if n not in names]
+        if unknown:
+            raise UsageError(f"--images: {folder} has no picture {unknown[0]!r}")
+        files = [p for p in files if p.stem in wanted]
+    return [_source(path, masks) for path in files]
+
+
+def _source(path: Path, masks: Path | None) -> Source:
+    pixels = load(path)
+    height, width, channels = pixels.shape
+    digest = hashlib.sha256(repr(pixels.shape).encode() + pixels.tobytes()).hexdigest()[:16]
+    found = [] if masks is None else [masks / f"{path.stem}.png", masks / path.stem]
+    found = [p for p in found if p.exists()]
+    return Source(path, width, height, channels == 4, digest, found[0] if found else None)
+
+
+def load(path: Path) -> Pixels:
+    """uint8 [H, W, 3] RGB, or [H, W, 4] where something is transparent; grey becomes RGB."""
+    pixels = pictures.read(path).pixels
+    if pixels.dtype.kind == "f":
+        pixels = np.rint(np.clip(pixels, 0, 1) * 255).astype(np.uint8)
+    elif pixels.dtype != np.uint8:
+        pixels = np.rint(pixels / 257.0).astype(np.uint8)
+    if pixels.ndim == 2:
+        pixels = pixels[..., None]
+    if pixels.shape[2] < 3:
+        pixels = np.dstack([pixels[..., :1]] * 3 + [pixels[..., 1:]])
+    if pixels.shape[2] == 4 and (pixels[..., 3] == 255).all():
+        pixels = pixels[..., :3]
+    return np.ascontiguousarray(pixels, np.uint8)
+
+
+def plan(sources: Sequence[Source], codecs: Iterable[Codec]) -> list[Task]:
+    """What there is to do: a codec without alpha leaves out pictures with it, and so on."""
+    table = [(codec, codec.version()) for codec in codecs]
+    return [
+        Task(source, codec, version, quality)
+        for source in sources
+        for codec, version in table
+        if (codec.alpha or not source.alpha) and (source.masks is not None or not codec.masks)
+        for quality in codec.qualities
+    ]
+
+
+def run(tasks: Sequence[Task], jobs: int, finished: Callable[[Row | Failure], None]) -> None:
+    """Does the tasks in `jobs` processes of one thread each, in any order.
+
+    Stops at once if `finished` raises or the user interrupts.
+
+    Raises:
+        LimitError: A process was killed, most likely for want of memory.
+    """
+    before = {name: os.environ.get(name) for name in ONE_THREAD}
+    os.environ.update(ONE_THREAD)
+    try:
+        context = multiprocessing.get_context("spawn")
+        with ProcessPoolExecutor(min(jobs, len(tasks)), context, _start) as pool:
+            try:
+                for future in as_completed([pool.submit(measure, t) for t in tasks]):
+                    finished(future.result())
+            except BaseException:
+                pool.shutdown(wait=False, cancel_futures=True)
+                for process in multiprocessing.active_children():
+                    process.terminate()
+                    process.join()
+                raise
+    except BrokenProcessPool:
+        raise LimitError("a worker process was killed, most likely for want of memory; "
+                         "try fewer --jobs") from None  # fmt: skip
+    finally:
+        for name, value in before.items():
+            os.environ.pop(name) if value is None else os.environ.update({name: value})
+
+
+def _start() -> None:
+    """A worker leaves interrupts to the main process, and OpenCV on one thread."""
+    import signal
+
+    import cv2
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    cv2.setNumThreads(1)
+
+
+def measure(task: Task) -> Row | Failure:
+    """Encodes and decodes; CPU seconds are those of the calls alone."""
+    source, codec = task.source, task.codec
+    where = f"{source.path.name} by {codec.name} at quality {task.quality:g}"
+    try:
+        return _measure(source, codec, task)
+    except PxiError as error:
+        return Failure(f"{where}: {error}")
+    except Exception as error:
+        # Foreign codecs raise whatever they like; the other measurements should not be lost.
+        return Failure(f"{where}: {type(error).__name__}: {error}")
+
+
+def _measure(source: Source, codec: Codec, task: Task) -> Row:
+    from .measure import ms_ssim, psnr
+
+    pixels = _pixels(source.path)
+    encode = codec.encode
+    if codec.masks:
+        from ..encoder.masks import load_masks
+
+        encode = partial(encode, masks=load_masks(str(source.masks), source.width, source.height))
+    _warm(codec)
+    start = time.process_time()
+    data = encode(pixels, task.quality)
+    middle = time.process_time()
+    decoded = codec.decode(data)
+    end = time.process_time()
+    if decoded.shape[:2] != pixels.shape[:2] or decoded.dtype != np.uint8:
+        raise InputError(f"decoded to {decoded.dtype} {decoded.shape}, not uint8 {pixels.shape}")
+    return Row(
+        source.path.stem, source.digest, source.width, source.height,
+        codec.name, codec.settings, task.version, machine(), task.quality,
+        len(data), round(8 * len(data) / (source.width * source.height), 6),
+        round(psnr(pixels, decoded), 5), round(ms_ssim(pixels, decoded), 7),
+        round(middle - start, 5), round(end - middle, 5),
+    )  # fmt: skip
+
+
+_pixels = lru_cache(maxsize=1)(load)
+
+_warmed: set[str] = set()
+
+
+def _warm(codec: Codec) -> None:
+    """Imports and tables of a codec are loaded before its first call is timed."""
+    if codec.name not in _warmed:
+        _warmed.add(codec.name)
+        y, x = np.mgrid[0:32, 0:32].astype(np.uint8)
+        ramp = np.dstack([8 * x, 8 * y, 4 * (x + y)])
+        codec.decode(codec.encode(ramp, codec.qualities[len(codec.qualities) // 2]))
+
+
+@lru_cache(maxsize=1)
+def machine() -> str:
+    """Processor and cores."""
+    model = platform.processor() or platform.machine()
+    info = Path("/proc/cpuinfo")
+    if info.exists():
+        names = [v for v in info.read_text().splitlines() if v.startswith("model name")]
+        model = names[0].split(":")[1].strip() if names else model
+    return f"{model}, {os.cpu_count()} cores"

@@ -1,0 +1,234 @@
+"""From rows to curves, BD-rates and tables."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import statistics
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from .measure import bd_rate, decibel, quality_at
+from .peers import Codec
+from .rows import Row
+
+Curve = list[tuple[float, float]]
+
+RATES = (0.2, 0.4, 0.64, 1.0)
+"""Bits a pixel at which quality is told."""
+
+ANCHORS = ("jpeg", "webp", "avif420", "avif444", "avif420-s0")
+"""Codecs that the printed tables compare with, where they ran."""
+
+METRICS: dict[str, Callable[[Row], float]] = {
+    "PSNR": lambda row: row.psnr,
+    "MS-SSIM": lambda row: row.ms_ssim,
+}
+
+TO_DB: dict[str, Callable[[float], float]] = {"PSNR": lambda value: value, "MS-SSIM": decibel}
+"""MS-SSIM is averaged as it is, and interpolated and drawn in dB."""
+
+
+@dataclass(frozen=True)
+class Results:
+    """All measurements of one codec, or its published curve.
+
+    Attributes:
+        name: Of the codec.
+        label: For plots.
+        rows: The measurements by picture; empty if published.
+        published: Curves of the average by metric, MS-SSIM as it is; empty if measured.
+    """
+
+    name: str
+    label: str
+    rows: Mapping[str, Sequence[Row]]
+    published: Mapping[str, Curve]
+
+    def curve(self, metric: str, picture: str) -> Curve:
+        """Rate and quality in dB of one picture."""
+        value, scale = METRICS[metric], TO_DB[metric]
+        return [(row.bpp, scale(value(row))) for row in self.rows[picture]]
+
+    def average(self, metric: str, pictures: Sequence[str] | None = None) -> Curve:
+        """Rate and quality in dB, averaged over pictures at each quality that all of them have."""
+        scale = TO_DB[metric]
+        if self.published:
+            return [(rate, scale(value)) for rate, value in self.published.get(metric, [])]
+        names = list(self.rows) if pictures is None else pictures
+        by_quality: dict[float, list[Row]] = {}
+        for name in names:
+            for row in self.rows[name]:
+                by_quality.setdefault(row.quality, []).append(row)
+        value = METRICS[metric]
+        return [
+            (statistics.fmean(r.bpp for r in rows), scale(statistics.fmean(map(value, rows))))
+            for _, rows in sorted(by_quality.items())
+            if len(rows) == len(names)
+        ]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Bits of one codec more than those of an anchor at equal quality, in per cent.
+
+    Attributes:
+        mean: BD-rate of each picture, averaged; NaN if no picture has one.
+        curve: BD-rate of the averaged curves; NaN if there is none.
+        better: Pictures with fewer bits than the anchor.
+        pictures: Pictures that have a BD-rate.
+    """
+
+    mean: float
+    curve: float
+    better: int
+    pictures: int
+
+
+def collect(rows: Sequence[Row], codecs: Sequence[Codec]) -> list[Results]:
+    """The measurements by codec, in the order of the codecs; those without any are left out."""
+    out = []
+    for codec in codecs:
+        by_picture: dict[str, list[Row]] = {}
+        for row in sorted(rows, key=lambda r: (r.picture, r.quality)):
+            if row.codec == codec.name:
+                by_picture.setdefault(row.picture, []).append(row)
+        if by_picture:
+            out.append(Results(codec.name, codec.label, by_picture, {}))
+    return out
+
+
+def published() -> list[Results]:
+    """Published curves of the 24 Kodak pictures; their sources stand in ``published.json``."""
+    entries = json.loads(Path(__file__).with_name("published.json").read_text("utf-8"))
+    keys = {"PSNR": "psnr", "MS-SSIM": "ms_ssim"}
+    return [
+        Results(e["name"], e["label"], {}, {m: list(zip(e["bpp"], e[k], strict=True))
+                                            for m, k in keys.items() if k in e})
+        for e in entries
+    ]  # fmt: skip
+
+
+def compare(one: Results, anchor: Results, metric: str, rates: tuple[float, float]) -> Comparison:
+    """BD-rates over the pictures that both codecs have, at rates within `rates`."""
+    common = [name for name in anchor.rows if one.published or name in one.rows]
+    each = [
+        bd_rate(one.curve(metric, n), anchor.curve(metric, n), rates)
+        for n in common
+        if not one.published
+    ]
+    each = [value for value in each if not math.isnan(value)]
+    return Comparison(
+        statistics.fmean(each) if each else math.nan,
+        bd_rate(one.average(metric, common), anchor.average(metric, common), rates),
+        sum(value < 0 for value in each),
+        len(each),
+    )
+
+
+def seconds(results: Results) -> tuple[float, float]:
+    """Median CPU seconds of encoding and decoding a picture; NaN if published."""
+    rows = [row for rows in results.rows.values() for row in rows]
+    if not rows:
+        return math.nan, math.nan
+    return statistics.median(r.encode_s for r in rows), statistics.median(r.decode_s for r in rows)
+
+
+def to_csv(results: Sequence[Results], rates: tuple[float, float]) -> str:
+    """Every figure as one line: codec, measure, against, value, pictures."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(["codec", "measure", "against", "value", "pictures"])
+    for one in results:
+        n = len(one.rows)
+        lines = [(f"psnr_at_{rate:g}_bpp", "", quality_at(one.average("PSNR"), rate), n)
+                 for rate in RATES]  # fmt: skip
+        lines += [
+            (name, "", value, n)
+            for name, value in zip(("encode_cpu_s", "decode_cpu_s"), seconds(one), strict=True)
+        ]
+        for metric in METRICS:
+            for anchor in results:
+                if anchor is not one and not anchor.published:
+                    c = compare(one, anchor, metric, rates)
+                    name = f"bd_{metric.lower().replace('-', '_')}"
+                    lines += [
+                        (f"{name}_mean_pct", anchor.name, c.mean, c.pictures),
+                        (f"{name}_curve_pct", anchor.name, c.curve, n),
+                        (f"{name}_better", anchor.name, c.better, c.pictures),
+                    ]
+        for measure, against, value, count in lines:
+            if not math.isnan(value):
+                writer.writerow([one.name, measure, against, f"{value:.5g}", count or ""])
+    return out.getvalue()
+
+
+def tables(results: Sequence[Results], rates: tuple[float, float]) -> str:
+    """The tables for people, as Markdown."""
+    parts = ["Quality at a rate, and median CPU seconds a picture", _quality_table(results)]
+    anchors = [r for name in ANCHORS for r in results if r.name == name]
+    anchors = anchors or [r for r in results if not r.published][:1]
+    span = f"{rates[0]:g} to {rates[1]:g} bpp"
+    for metric in METRICS:
+        parts += [
+            f"BD-rate by {metric} over {span}: mean of the pictures' (that of the mean curve) "
+            "[pictures with fewer bits/compared]",
+            _bd_table(results, anchors, metric, rates),
+        ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _quality_table(results: Sequence[Results]) -> str:
+    head = ["codec", "pictures", *(f"dB at {r:g} bpp" for r in RATES), "encode s", "decode s"]
+    lines = [head]
+    for one in results:
+        curve, times = one.average("PSNR"), seconds(one)
+        cells = [_number(quality_at(curve, rate), ".2f") for rate in RATES]
+        cells += [_number(t, ".3g") for t in times]
+        lines.append([_name(one), str(len(one.rows) or ""), *cells])
+    return _markdown(lines)
+
+
+def _bd_table(
+    results: Sequence[Results], anchors: Sequence[Results], metric: str, rates: tuple[float, float]
+) -> str:
+    lines = [["codec", *(f"vs {a.name}" for a in anchors)]]
+    for one in results:
+        if one.average(metric):
+            lines.append([_name(one), *(_bd_cell(one, a, metric, rates) for a in anchors)])
+    return _markdown(lines)
+
+
+def _bd_cell(one: Results, anchor: Results, metric: str, rates: tuple[float, float]) -> str:
+    if one is anchor:
+        return "0"
+    c = compare(one, anchor, metric, rates)
+    if one.published:
+        return _number(c.curve, "(+.1f)")
+    if not c.pictures:
+        return ""
+    return f"{c.mean:+.1f} {_number(c.curve, '(+.1f)')} [{c.better}/{c.pictures}]"
+
+
+def _name(one: Results) -> str:
+    return f"{one.label} (published)" if one.published else one.name
+
+
+def _number(value: float, form: str) -> str:
+    """A number, or nothing for NaN; brackets of the form stand around it."""
+    if math.isnan(value):
+        return ""
+    return f"({value:{form[1:-1]}})" if form[0] == "(" else f"{value:{form}}"
+
+
+def _markdown(lines: Sequence[Sequence[str]]) -> str:
+    widths = [max(len(line[i]) for line in lines) for i in range(len(lines[0]))]
+    rule = [widths[0] * "-", *((w - 1) * "-" + ":" for w in widths[1:])]
+    rows = [
+        [line[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(line[1:], widths[1:], strict=True))]
+        for line in lines
+    ]
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in [rows[0], rule, *rows[1:]])
