@@ -5,7 +5,7 @@ PHOTO := docs/images/photo.png
 
 .PHONY: demo test lint bench clean
 
-.venv/ready: pyproject.toml constraints.txt setup.py proxyimg_codec/_kernel.cpp proxyimg_codec/_kernel_decode.h
+.venv/ready: pyproject.toml constraints.txt setup.py proxyimg_codec/_kernel.cpp $(wildcard proxyimg_codec/_kernel_*.h)
 	$(PYTHON) -m venv .venv
 	$(BIN)/pip install --quiet -c constraints.txt setuptools
 	$(BIN)/pip install --quiet -c constraints.txt -e '.[dev]'

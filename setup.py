@@ -1,5 +1,6 @@
 """Builds the optional compiled kernel; without a C++20 compiler the package works, slower."""
 
+import glob
 import os
 import sys
 
@@ -18,7 +19,7 @@ setup(
         Extension(
             "proxyimg_codec._kernel",
             ["proxyimg_codec/_kernel.cpp"],
-            depends=["proxyimg_codec/_kernel_decode.h"],
+            depends=sorted(glob.glob("proxyimg_codec/_kernel_*.h")),
             extra_compile_args=flags,
             extra_link_args=link,
             optional=True,

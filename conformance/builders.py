@@ -17,6 +17,7 @@ from proxyimg_codec.geometry.pose import REST, Pose
 from proxyimg_codec.image import Image, Layer, Layers
 from proxyimg_codec.texture.implicit import Box, ImplicitTexture
 from proxyimg_codec.texture.network import NetShape, Network
+from proxyimg_codec.texture.pyramid import Texture
 
 Path = NDArray[np.int64]
 Point = tuple[float, float]
@@ -164,7 +165,7 @@ def bend(numbers: Numbers, mesh: Mesh, reach: int = 24) -> NDArray[np.int64]:
 def layer(
     name: str,
     box: Box,
-    texture: ImplicitTexture,
+    texture: Texture,
     *paths: Path,
     unit: int = 4,
     mesh: Mesh | None = None,
@@ -184,7 +185,7 @@ def picture(
     extra: Sequence[Chunk] = (),
 ) -> Image:
     """An image of `layers`, back to front."""
-    channels = max(net.shape.channels for net in networks)
+    channels = max(v.texture.channels(networks) for v in layers)
     return Image(*size, channels, opaque, 8, Layers(layers), networks, extra=tuple(extra))
 
 

@@ -45,6 +45,7 @@ class Case:
         input: The `.pxi` file.
         renders: Pictures to make, if the file is valid.
         error: Class of error, one of `EXIT_CODES`, if it must be refused.
+        latents: SHA-256 of the latents of its planes, in hexadecimal, if it has any.
     """
 
     name: str
@@ -53,6 +54,7 @@ class Case:
     input: Path
     renders: tuple[Render, ...]
     error: str | None
+    latents: str | None = None
 
 
 def load(folder: Path = FOLDER, pattern: str = "*") -> list[Case]:
@@ -78,7 +80,7 @@ def _read(file: Path) -> Case:
         raise ValueError(f"{file}: needs either renders or a known class of error")
     return Case(
         file.parent.name, values["title"], tuple(values["tests"]), file.with_name("input.pxi"),
-        tuple(renders), error,
+        tuple(renders), error, values.get("latents"),
     )  # fmt: skip
 
 

@@ -27,6 +27,9 @@ class Ended:
 Decoder = Callable[[Path, Path, Sequence[str]], Ended]
 """Called with the input, where the picture goes, and flags."""
 
+Digester = Callable[[Path], Ended]
+"""Called with the input; its message is the SHA-256 of the latents, in hexadecimal."""
+
 
 @dataclass(frozen=True)
 class Result:
@@ -35,8 +38,8 @@ class Result:
     Attributes:
         case: Name of the case.
         render: Which of its renders, from 0.
-        problem: Empty if it passed, else ``timeout``, ``exit``, ``output``, ``size`` or ``pixels``,
-            a colon and the details.
+        problem: Empty if it passed, else ``timeout``, ``exit``, ``output``, ``size``, ``latents``
+            or ``pixels``, a colon and the details.
         peak: Largest error in 8-bit levels, or None if nothing was compared.
         rms: Root mean square error, likewise.
         seconds: How long the decoder ran.
@@ -55,7 +58,13 @@ class Result:
         return not self.problem
 
 
-def judge(case: Case, number: int, decoder: Decoder, suffix: str = ".png") -> Result:
+def judge(
+    case: Case,
+    number: int,
+    decoder: Decoder,
+    suffix: str = ".png",
+    digester: Digester | None = None,
+) -> Result:
     """Runs `decoder` on render `number` of a case, or on an input that must be refused.
 
     Args:
@@ -63,6 +72,7 @@ def judge(case: Case, number: int, decoder: Decoder, suffix: str = ".png") -> Re
         number: Position in `case.renders`; 0 if the case has none.
         decoder: What is tested.
         suffix: Of the output: ``.png`` or ``.npy``.
+        digester: Hashes latents, which is tested too, with the first render of a case.
     """
     render = case.renders[number] if case.renders else None
     with tempfile.TemporaryDirectory(prefix="pxi-conformance-") as folder:
@@ -76,6 +86,8 @@ def judge(case: Case, number: int, decoder: Decoder, suffix: str = ".png") -> Re
             problem = "output: a picture was written although the file must be refused"
         if not problem and render is not None:
             problem, peak, rms = _compare(output, render)
+    if case.latents and number == 0 and digester and not problem:
+        problem = _hash(digester(case.input), case.latents)
     return Result(case.name, number, problem, peak, rms, seconds)
 
 
@@ -88,6 +100,13 @@ def _ending(ended: Ended, wanted: int) -> str:
     if ended.code != wanted:
         return f"exit: code {ended.code} instead of {wanted} ({said})"
     return ""
+
+
+def _hash(ended: Ended, wanted: str) -> str:
+    found = ended.message.strip()
+    if ended.code == 0 and found != wanted:
+        return f"latents: the hash is {found[:64] or 'missing'} instead of {wanted}"
+    return _ending(ended, 0)
 
 
 def _compare(output: Path, render: Render) -> tuple[str, float | None, float | None]:

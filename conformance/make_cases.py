@@ -23,12 +23,27 @@ from proxyimg_codec import errors, kernel
 from proxyimg_codec.image import from_bytes
 from proxyimg_codec.pictures import encode_png
 
-from . import bent, invalid, invalid_posed, nodes, posed, valid, views
+from . import (
+    bent,
+    invalid,
+    invalid_posed,
+    invalid_pyramids,
+    nodes,
+    posed,
+    pyramid_views,
+    pyramids,
+    symbols,
+    valid,
+    views,
+)
 from .builders import Numbers
 from .cases import EXIT_CODES, FOLDER
 
-VALID = {**valid.CASES, **views.CASES, **bent.CASES, **posed.CASES, **nodes.CASES}
-INVALID = {**invalid.CASES, **invalid_posed.CASES}
+VALID = {
+    **valid.CASES, **views.CASES, **bent.CASES, **posed.CASES, **nodes.CASES, **pyramids.CASES,
+    **pyramid_views.CASES,
+}  # fmt: skip
+INVALID = {**invalid.CASES, **invalid_posed.CASES, **invalid_pyramids.CASES}
 
 PEAK, RMS = 0.05, 0.01
 """Errors in 8-bit levels that are allowed: ten times what float32 sums in another order cost."""
@@ -45,13 +60,17 @@ def build() -> dict[str, tuple[bytes, dict[str, Any]]]:
             {"args": args, "expected": f"expected-{i}.png", "peak": PEAK, "rms": RMS}
             for i, args in enumerate(case.renders, 1)
         ]
-        description = {
+        description: dict[str, Any] = {
             "title": case.title,
             "tests": list(case.tests),
             "provenance": {"generator": "conformance.make_cases", "seed": numbers.seed},
             "renders": renders,
         }
-        out[name] = made if isinstance(made, bytes) else made.to_bytes(), description
+        data = made if isinstance(made, bytes) else made.to_bytes()
+        latents = symbols.digest(data)
+        if latents:
+            description["latents"] = latents
+        out[name] = data, description
     bases = {bad.base: bad.base() for bad in INVALID.values()}
     for name, bad in INVALID.items():
         error = name.split("-")[0]

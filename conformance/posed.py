@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from dataclasses import replace
 
 from proxyimg_codec.container import tree, undo
-from proxyimg_codec.container.chunks import PREFIX, Chunk, read, write
+from proxyimg_codec.container.chunks import Chunk, read, write
 from proxyimg_codec.container.fields import pack
 from proxyimg_codec.geometry.pose import Pose
 from proxyimg_codec.image import Image, Layers
@@ -191,14 +190,14 @@ def _history(state: bytes, history: bytes, size: int) -> Chunk:
 @_case("A history of one edit does not change the picture", "chunks: authoring data")
 def _undo(n: Numbers) -> bytes:
     data = layered(n).to_bytes()
+    present = read(data)[:-1]
     # A map of no chunks and one step "{}" that refers to all chunks, in one raw zstd block.
-    count = len(read(data)) - 1
+    count = len(present)
     steps = b"\x91\x92\xa2{}" + bytes([0x90 + count, *range(count)])
     history = b"\x82\xa6chunks\x90\xa5steps" + steps
     head = (len(history) << 3 | 1).to_bytes(3, "little")
     frame = b"\x28\xb5\x2f\xfd\x20" + bytes([len(history)]) + head + history
-    tail = read(data)[-1].size
-    return _with(data, _history(hashlib.sha256(data[:-tail]).digest(), frame, len(history)))
+    return _with(data, _history(undo.digest(present), frame, len(history)))
 
 
 @_case("A history of another picture is ignored, whatever it holds", "chunks: authoring data")
@@ -208,6 +207,10 @@ def _undo_stale(n: Numbers) -> bytes:
 
 @_case("A file of version 0.1", "file: version")
 def _version_0_1(n: Numbers) -> bytes:
-    data = layered(n).to_bytes()
-    signature = PREFIX.unpack_from(data)[0]
-    return PREFIX.pack(signature, 0, 1, 0) + data[PREFIX.size :]
+    return write(read(layered(n).to_bytes()), (0, 1))
+
+
+@_case("A file of version 0.2, with a mesh and a pose", "file: version")
+def _version_0_2(n: Numbers) -> bytes:
+    mesh = grid_mesh((2, 1), 5, 4)
+    return write(read(on_back(n, disc(n, mesh, nodes=bend(n, mesh))).to_bytes()), (0, 2))

@@ -10,8 +10,9 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
-from .judge import Decoder, Ended
+from .judge import Decoder, Digester, Ended
 
 _FILE_BYTES = 1 << 28
 _MESSAGE_BYTES = 2000
@@ -63,24 +64,44 @@ def command_decoder(template: str, timeout: float, memory: int) -> Decoder:
     """
 
     def decode(source: Path, target: Path, flags: Sequence[str]) -> Ended:
-        words = expand(template, source, target, flags)
-        limited = [sys.executable, "-ISc", _LIMITED, str(memory), str(_FILE_BYTES), *words]
-        with tempfile.TemporaryFile() as errors:
-            process = subprocess.Popen(
-                limited, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=errors,
-                start_new_session=True,
-            )  # fmt: skip
-            try:
-                code = process.wait(timeout)
-            except subprocess.TimeoutExpired:
-                return Ended(None, f"killed after {timeout:g} s")
-            finally:
-                if process.returncode is None:
-                    _kill(process)
-            errors.seek(max(errors.seek(0, os.SEEK_END) - _MESSAGE_BYTES, 0))
-            return Ended(code, errors.read().decode("utf-8", "replace"))
+        return _run(expand(template, source, target, flags), timeout, memory, "stderr")
 
     return decode
+
+
+def command_digester(template: str, timeout: float, memory: int) -> Digester:
+    """A command that prints the hash of a file's latents.
+
+    Args:
+        template: Words with ``{in}``, quoted as for a shell.
+        timeout: Seconds after which it is killed, with all its children.
+        memory: Bytes of data that each of its processes may hold.
+    """
+
+    def digest(source: Path) -> Ended:
+        words = [word.replace("{in}", str(source)) for word in shlex.split(template)]
+        return _run(words, timeout, memory, "stdout")
+
+    return digest
+
+
+def _run(words: Sequence[str], timeout: float, memory: int, kept: str) -> Ended:
+    """How a command ends, and the end of its ``stdout`` or ``stderr``."""
+    limited = [sys.executable, "-ISc", _LIMITED, str(memory), str(_FILE_BYTES), *words]
+    with tempfile.TemporaryFile() as said:
+        outputs: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        process = subprocess.Popen(
+            limited, stdin=subprocess.DEVNULL, start_new_session=True, **outputs | {kept: said}
+        )
+        try:
+            code = process.wait(timeout)
+        except subprocess.TimeoutExpired:
+            return Ended(None, f"killed after {timeout:g} s")
+        finally:
+            if process.returncode is None:
+                _kill(process)
+        said.seek(max(said.seek(0, os.SEEK_END) - _MESSAGE_BYTES, 0))
+        return Ended(code, said.read().decode("utf-8", "replace"))
 
 
 def _kill(process: subprocess.Popen[bytes]) -> None:

@@ -15,21 +15,27 @@ from dataclasses import asdict
 from pathlib import Path
 
 from .cases import FOLDER, Case, load
-from .judge import Decoder, Result, judge
-from .processes import command_decoder, expand
+from .judge import Decoder, Digester, Result, judge
+from .processes import command_decoder, command_digester, expand
 
-OWN_DECODER = f"{shlex.quote(sys.executable)} -m proxyimg_codec.cli.decode {{in}} {{out}} {{args}}"
+_PYTHON = shlex.quote(sys.executable)
+OWN_DECODER = f"{_PYTHON} -m proxyimg_codec.cli.decode {{in}} {{out}} {{args}}"
+OWN_DIGESTER = f"{_PYTHON} -m conformance.symbols {{in}}"
 
 
 def run(
-    cases: Sequence[Case], decoder: Decoder, jobs: int = 1, suffix: str = ".png"
+    cases: Sequence[Case],
+    decoder: Decoder,
+    jobs: int = 1,
+    suffix: str = ".png",
+    digester: Digester | None = None,
 ) -> list[Result]:
     """The verdicts on every render of every case, in order."""
     runs = [(case, i) for case in cases for i in range(max(len(case.renders), 1))]
     if jobs == 1:
-        return [judge(case, i, decoder, suffix) for case, i in runs]
+        return [judge(case, i, decoder, suffix, digester) for case, i in runs]
     with ThreadPoolExecutor(jobs) as pool:
-        return list(pool.map(lambda r: judge(r[0], r[1], decoder, suffix), runs))
+        return list(pool.map(lambda r: judge(r[0], r[1], decoder, suffix, digester), runs))
 
 
 def table(results: Sequence[Result]) -> str:
@@ -54,8 +60,11 @@ def arguments() -> argparse.ArgumentParser:
     """The command line."""
     p = argparse.ArgumentParser("conformance.runner", description="Test a decoder of .pxi files.")
     add = p.add_argument
-    add("--decoder", metavar="CMD", default=OWN_DECODER,
+    add("--decoder", metavar="CMD",
         help="command with {in}, {out} and {args}; pxi-decode by default")  # fmt: skip
+    add("--latents", metavar="CMD",
+        help="command with {in} that prints the SHA-256 of all latents; the package's own "
+        "without --decoder")  # fmt: skip
     add("--cases", metavar="DIR", type=Path, default=FOLDER, help="folder of cases")
     add("--only", metavar="PATTERN", default="*", help="names of cases, with * and ?")
     add("--format", choices=["png", "npy"], default="png", help="type of output to ask for")
@@ -75,15 +84,18 @@ def main(argv: Sequence[str] | None = None) -> int:
     cases = load(args.cases, args.only)
     if not cases:
         parser.error(f"no case in {args.cases} matches {args.only}")
+    template = args.decoder or OWN_DECODER
+    hashing = args.latents or ("" if args.decoder else OWN_DIGESTER)
     try:
-        program = expand(args.decoder, Path("in"), Path("out"), [])[0]
+        program = expand(template, Path("in"), Path("out"), [])[0]
     except ValueError as error:
         parser.error(str(error))
     if shutil.which(program) is None:
         parser.error(f"{program} is not a program")
     started = time.perf_counter()
-    decoder = command_decoder(args.decoder, args.timeout, args.memory << 20)
-    results = run(cases, decoder, args.jobs, f".{args.format}")
+    decoder = command_decoder(template, args.timeout, args.memory << 20)
+    digester = command_digester(hashing, args.timeout, args.memory << 20) if hashing else None
+    results = run(cases, decoder, args.jobs, f".{args.format}", digester)
     seconds = time.perf_counter() - started
     failed = failed_cases(results)
     print(table(results))
@@ -91,7 +103,7 @@ def main(argv: Sequence[str] | None = None) -> int:
           f"{len(results)} runs, {seconds:.1f} s")  # fmt: skip
     if args.json:
         report = {
-            "decoder": args.decoder,
+            "decoder": template,
             "cases": len(cases),
             "failed": failed,
             "seconds": seconds,

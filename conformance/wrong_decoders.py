@@ -29,6 +29,7 @@ from proxyimg_codec.texture import diffusion, implicit, network
 
 from .wrong_poses import FAULTS as FAULTS_OF_POSES
 from .wrong_poses import Anything, Patch
+from .wrong_pyramids import FAULTS as FAULTS_OF_PYRAMIDS
 
 
 def _ignoring_holes(paths: Any, *window: int) -> Any:
@@ -151,6 +152,7 @@ FAULTS: dict[str, list[Patch]] = {
         (network, "read_halves", _lenient_halves)],
     "accepts-any-encoding": [(file, "unpack", _lenient_fields)],
     **FAULTS_OF_POSES,
+    **FAULTS_OF_PYRAMIDS,
     "exit-code-1": [(decode, "main", _crashing)],
     "exit-code-0": [(decode, "main", _obliging)],
     "hangs": [(decode, "main", _hanging)],

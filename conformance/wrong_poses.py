@@ -196,8 +196,8 @@ FAULTS: dict[str, list[Patch]] = {
     "follows-parents": [(image, "from_bytes", _following_parents)],
     "believes-histories": [(undo, "digest", lambda _: Anything())],
     "accepts-contradictions": [(check, "check", lambda *a: None)],
-    "reads-only-0.2": [(chunks, "READABLE", ((0, 2),))],
-    "reads-the-future": [(chunks, "READABLE", ((0, 1), (0, 2), (0, 3)))],
+    "reads-only-0.3": [(chunks, "READABLE", ((0, 3),))],
+    "reads-the-future": [(chunks, "READABLE", tuple((0, k) for k in range(1, 9)))],
     "accepts-idle-poses": [(Pose, "at_rest", False)],
 }  # fmt: skip
 """What each wrong decoder replaces."""

@@ -1,5 +1,5 @@
-// Fused kernel of the implicit texture coder: gather -> encode -> MLP, forward and training; and
-// (in _kernel_decode.h) the entropy decoder.
+// Fused kernel of the implicit texture coder: gather -> encode -> MLP, forward and training; and, in
+// headers, the entropy decoder of arrays and the pyramid coder.
 //
 // numpy (render) and torch (training) do the same arithmetic; this file is the fast engine and is
 // judged by them. Data is processed in blocks of BLOCK entries in structure-of-arrays layout
@@ -14,6 +14,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <new>
 #include <system_error>
 #include <thread>
 #include <vector>
@@ -36,6 +37,10 @@ static const int LANES = 4, TILE = 4;
 typedef float vec __attribute__((vector_size(4 * LANES)));
 typedef int32_t ints __attribute__((vector_size(4 * LANES)));
 typedef float vec8 __attribute__((vector_size(32), aligned(4), may_alias));  // anywhere in memory
+
+#include "_kernel_pyramid.h"
+#include "_kernel_synthesis.h"
+
 static const int BLOCK = 256, NV = BLOCK / LANES, PARTS = 4, MAX_LAYERS = 10, SPAN = 32;
 static const float PI = 3.14159265358979f;
 
@@ -519,6 +524,31 @@ double pxi_train(const Train *task, const int32_t *pixels, int64_t steps, int64_
     work(0);
     for (auto &th : pool) th.join();
     return loss / ((double)t.net.channels * batch * std::max<int64_t>(steps, 1));
+}
+
+// Codes a level of a pyramid; what went wrong, if anything.
+int pxi_pyramid_level(Level *level) {
+    try {
+        return LevelCoder(*level).run();
+    } catch (const std::bad_alloc &) {
+        return NO_MEMORY;
+    }
+}
+
+// Synthesis of a level of a pyramid; what went wrong, if anything.
+int pxi_pyramid_synthesis(const Synthesis *level) {
+    try {
+        Synthesizer(*level).run();
+        return NOTHING;
+    } catch (const std::bad_alloc &) {
+        return NO_MEMORY;
+    }
+}
+
+// Words that encoding gives, at the back of `words`; see `rans_encode`.
+int64_t pxi_rans_encode(const uint16_t *start, const uint16_t *freq, const int64_t *ends, int64_t groups,
+                        int32_t scale_bits, int32_t lanes, uint32_t *states, uint16_t *words) {
+    return rans_encode(start, freq, ends, groups, scale_bits, lanes, states, words);
 }
 
 // Network output of `n` entries: out is [n][channels].

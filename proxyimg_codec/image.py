@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -31,9 +31,12 @@ from .limits import DEFAULT_LIMITS, Limits
 from .render.cache import Cache
 from .render.compose import render
 from .render.view import make_view
-from .texture import implicit, network
+from .texture import implicit, network, planes, pyramid
+from .texture.cuts import Cuts
 from .texture.implicit import Box, ImplicitTexture
 from .texture.network import Network
+from .texture.planes import Planes
+from .texture.pyramid import PyramidTexture, Texture
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +47,7 @@ class Layer(Editable):
         name: Unique in the image.
         box: x, y, width, height of the texture's rectangle in canvas pixels.
         boundary: Closed paths at rest, or None for the whole canvas.
-        texture: Codes and the index of their network.
+        texture: Codes and the index of their network, or a view of planes.
         mesh: Proxy nodes, or None.
         sampling: How features are found: 0 direct, 1 to 3 at the proxy nodes.
         pose: What edits have done to it.
@@ -55,12 +58,19 @@ class Layer(Editable):
     name: str
     box: Box
     boundary: Boundary | None
-    texture: ImplicitTexture
+    texture: Texture
     mesh: Mesh | None = None
     sampling: int = 0
     pose: Pose = REST
     parent: str | None = None
     image: Image | None = field(default=None, repr=False)
+
+    @property
+    def network(self) -> Network | None:
+        """What decodes its texture; None where that is no network of the file."""
+        number = self.texture.network
+        assert self.image is not None, "a layer of no image has no networks"
+        return None if number is None else self.image.networks[number]
 
     @cached_property
     def outline(self) -> Boundary | None:
@@ -100,6 +110,25 @@ class Layers(Sequence[Layer]):
         raise UsageError(f"there is no layer {key!r}; the picture has {names}")
 
 
+def _settled(layers: Sequence[Layer]) -> list[Layer]:
+    """Layers whose views have a mask where a boundary that cuts them is not in its place."""
+    boundaries = [layer.boundary for layer in layers]
+    shown: dict[Texture, Texture] = {}
+    for i, layer in enumerate(layers):
+        view = layer.texture
+        if view in shown:
+            continue
+        shown[view] = view
+        if isinstance(view, PyramidTexture) and view.cuts is not None:
+            sharing = (k for k, v in enumerate(layers) if v.texture is view)
+            home = next((k for k in sharing if layers[k].box == view.cuts.box), None)
+            if home is None:
+                shown[view] = view.masked()
+            elif home > i or view.cuts.numbers(i, boundaries) is None:
+                shown[view] = view.masked(boundaries[home], boundaries[home + 1 :])
+    return [replace(layer, texture=shown[layer.texture]) for layer in layers]
+
+
 @dataclass(frozen=True, eq=False)
 class Image:
     """A `.pxi` picture in memory.
@@ -135,15 +164,15 @@ class Image:
     cache: Cache = field(default_factory=Cache, repr=False)
 
     def __post_init__(self) -> None:
-        bound = Layers(replace(layer, image=self) for layer in self.layers)
+        bound = Layers(replace(layer, image=self) for layer in _settled(self.layers))
         object.__setattr__(self, "layers", bound)
         object.__setattr__(self, "blocks", MappingProxyType(dict(self.blocks)))
         object.__setattr__(self, "groups", MappingProxyType(dict(self.groups)))
         if self.info is not None:
             object.__setattr__(self, "info", MappingProxyType(dict(self.info)))
         for layer in self.layers:
-            layer.texture.codes.flags.writeable = False
-            layer.texture.stored.flags.writeable = False
+            for array in layer.texture.arrays:
+                array.flags.writeable = False
 
     def edited(self, *operations: Mapping[str, Any]) -> Image:
         """The picture after `operations`, in order; each can be undone.
@@ -172,7 +201,10 @@ class Image:
         return replace(image, history=self.history[: len(self.history) - steps])
 
     def baked(self) -> Image:
-        """The same picture without its history."""
+        """The same picture without its history.
+
+        Pixels of a layer that was removed stay in planes that other layers show parts of.
+        """
         return replace(self, history=())
 
     def render(
@@ -285,6 +317,7 @@ class Image:
             ),
             tuple(n.packed for n in self.networks),
             self._textures(),
+            tuple(p.packed for p in self._planes()),
             tuple({"layer": i, **m.fields} for i, m in meshes),
             tuple({"layer": i, **posing.encode(v.pose, v.mesh)} for i, v in poses),
             self._tree(),
@@ -294,15 +327,37 @@ class Image:
             self.extra,
         )
 
+    def _planes(self) -> list[Planes]:
+        """The planes that textures show, in the order of their first use."""
+        views = (v.texture for v in self.layers if isinstance(v.texture, PyramidTexture))
+        return list(dict.fromkeys(source for view in views for source in view.sources))
+
     def _textures(self) -> tuple[Mapping[str, Any], ...]:
         """Fields of each TEXR; what is equal to an earlier one refers to it."""
-        first: dict[bytes, int] = {}
+        first: dict[Hashable, int] = {}
+        numbers = {p: k for k, p in enumerate(self._planes())}
         out: list[Mapping[str, Any]] = []
         for i, layer in enumerate(self.layers):
-            fields = layer.texture.packed
-            at = first.setdefault(pack(texr.FIELDS, fields), i)
+            at = first.get(layer.texture)
+            if at is None:
+                fields, meaning = self._texture(i, numbers)
+                key = (pack(texr.CODERS[fields["coder"]], fields), meaning)
+                at = first[layer.texture] = first.setdefault(key, i)
             out.append(fields if at == i else {"coder": texr.SHARED, "texture": at})
         return tuple(out)
+
+    def _texture(
+        self, number: int, planes: Mapping[Planes, int]
+    ) -> tuple[Mapping[str, Any], Hashable]:
+        """Fields of a layer's TEXR, and what else they depend on for their meaning."""
+        shown = self.layers[number].texture
+        if isinstance(shown, ImplicitTexture):
+            return shown.packed, None
+        if shown.cuts is None:
+            return shown.fields(planes), None
+        cuts = shown.cuts.numbers(number, [v.boundary for v in self.layers])
+        assert cuts is not None, "views whose cuts are gone have a mask"
+        return shown.fields(planes, cuts), (shown.cuts.box, number in cuts)
 
     def _tree(self) -> dict[str, Any] | None:
         above = [layer.parent for layer in self.layers] + list(self.groups.values())
@@ -355,25 +410,31 @@ def from_bytes(data: bytes, limits: Limits = DEFAULT_LIMITS) -> Image:
     groups = c.tree["groups"] if c.tree else []
     nodes = [None, *(v["name"] for v in c.layers), *groups]
     parents = [nodes[k] for k in c.tree["parents"]] if c.tree else [None] * len(c.layers)
-    textures: list[ImplicitTexture] = []
+    sources = [planes.unpack(v, f"chunk PLAN {i}") for i, v in enumerate(c.planes)]
+    outlines = [boundaries.decode(v, f"chunk LAYR {i}") for i, v in enumerate(c.layers)]
+    boxes = [(v["box"][0], v["box"][1], v["box"][2], v["box"][3]) for v in c.layers]
+    textures: list[Texture] = []
     for i, (v, t) in enumerate(zip(c.layers, c.textures, strict=True)):
         if t["coder"] == texr.SHARED:
             textures.append(textures[t["texture"]])
+        elif t["coder"] == texr.PYRAMID:
+            cuts = Cuts.of(t["cuts"], i, outlines, boxes[i])
+            textures.append(pyramid.unpack(t, sources, f"chunk TEXR {i}", cuts))
         else:
             textures.append(implicit.unpack(t, networks, f"chunk TEXR {i}", v["sampling"]))
     layers = [
         Layer(
             v["name"],
-            (v["box"][0], v["box"][1], v["box"][2], v["box"][3]),
-            boundaries.decode(v, f"chunk LAYR {i}"),
+            box,
+            outline,
             texture,
             meshes.get(i),
             v["sampling"],
             poses.get(i, REST),
             parent,
         )
-        for i, (v, texture, parent) in enumerate(
-            zip(c.layers, textures, parents[: len(c.layers)], strict=True)
+        for i, (v, box, outline, texture, parent) in enumerate(
+            zip(c.layers, boxes, outlines, textures, parents[: len(c.layers)], strict=True)
         )
     ]
     width, height = c.head["size"]

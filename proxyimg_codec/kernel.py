@@ -1,4 +1,4 @@
-"""The compiled kernel (`_kernel.cpp`) behind ctypes: rendering, training, entropy decoding.
+"""The compiled kernel (`_kernel.cpp`) behind ctypes: rendering, training, entropy coding.
 
 It is optional: `available()` is false where the package was installed without a C++ compiler.
 """
@@ -92,6 +92,15 @@ def library() -> ct.CDLL | None:
             ]  # fmt: skip
             lib.pxi_decode.restype = ct.c_int64
             lib.pxi_decode.argtypes = [ct.POINTER(Coded)]
+            lib.pxi_pyramid_level.restype = ct.c_int
+            lib.pxi_pyramid_level.argtypes = [ct.c_void_p]
+            lib.pxi_pyramid_synthesis.restype = ct.c_int
+            lib.pxi_pyramid_synthesis.argtypes = [ct.c_void_p]
+            lib.pxi_rans_encode.restype = ct.c_int64
+            lib.pxi_rans_encode.argtypes = [
+                ct.c_void_p, ct.c_void_p, ct.c_void_p, ct.c_int64, ct.c_int32, ct.c_int32,
+                ct.c_void_p, ct.c_void_p,
+            ]  # fmt: skip
             return lib
     return None
 
@@ -176,3 +185,26 @@ def decode(
         raise FormatError("entropy-coded stream ends too early")
     decoder.states[:] = states
     decoder.used = used
+
+
+def rans_encode(
+    start: NDArray[np.uint16], freq: NDArray[np.uint16], ends: NDArray[np.int64],
+    scale_bits: int, states: NDArray[np.uint32],
+) -> NDArray[np.uint16]:  # fmt: skip
+    """Words of the stream of symbols [N], as `entropy.rans` makes them in numpy.
+
+    Args:
+        start: Cumulative frequencies before the symbols.
+        freq: Their frequencies.
+        ends: Number of symbols up to the end of each group.
+        scale_bits: Frequencies sum to 2**scale_bits.
+        states: A power of two of states at their start; they move on.
+    """
+    lib = library()
+    assert lib is not None, "check available() first"
+    words = np.empty(len(start), np.uint16)
+    count = lib.pxi_rans_encode(
+        pointer(start), pointer(freq), pointer(ends), len(ends), scale_bits, len(states),
+        pointer(states), pointer(words),
+    )  # fmt: skip
+    return words[len(words) - count :]

@@ -23,8 +23,13 @@ class Limits:
         overlap: How often, in the mean, the triangles of a deformed layer may cover a sample.
         beyond: Pairs of a point that no face of a mesh holds and a face, which are compared to
             find the nearest.
-        codes: Scalar codes in all textures together, stored or not.
-        wavefronts: Columns plus twice the rows of a plane of codes: steps of its decoding.
+        codes: Scalar codes of all textures and cells of all masks together, stored or not.
+        samples: Raster samples of all planes together.
+        filled: Raster samples of all parts that are shown with a mask or cuts, which may have to be
+            filled.
+        covered: Raster samples of all parts that boundaries cut, once for each of these.
+        wavefronts: Columns plus twice the rows of a plane of codes or a mask, or plus thrice the
+            rows of a raster: steps of its decoding.
         parameters: Parameters of all networks together.
         metadata_bytes: One metadata block after decompression.
         output_pixels: Pixels of one rendered picture.
@@ -41,6 +46,9 @@ class Limits:
     overlap: int = 64
     beyond: int = 1 << 28
     codes: int = 1 << 25
+    samples: int = 1 << 26
+    filled: int = 1 << 27
+    covered: int = 1 << 31
     wavefronts: int = 1 << 16
     parameters: int = 1 << 22
     metadata_bytes: int = 1 << 26

@@ -20,7 +20,8 @@ from proxyimg_codec.geometry.mesh import Refined
 from proxyimg_codec.geometry.pose import Pose
 from proxyimg_codec.image import Image, from_bytes
 from proxyimg_codec.texture.diffusion import fill
-from proxyimg_codec.texture.implicit import ImplicitTexture
+from proxyimg_codec.texture.planes import Planes
+from proxyimg_codec.texture.pyramid import PyramidTexture, Texture
 
 Piece = tuple[int, str]
 """A number of bytes and what they mean."""
@@ -32,7 +33,7 @@ LINES = 16
 """Lines of one piece that are shown; the rest is counted."""
 
 MAPS = (
-    *("HEAD", "LAYR", "MESH", "POSE", "NETW", "TEXR"),
+    *("HEAD", "LAYR", "MESH", "POSE", "NETW", "PLAN", "TEXR"),
     *(*meta.BLOCKS.values(), meta.INFO_TYPE, tree.TYPE, undo.TYPE),
 )
 
@@ -87,6 +88,10 @@ BINARY: dict[str, Callable[[bytes], Iterator[Piece]]] = {
     "weights": arrays,
     "stored": coded_array,
     "codes": coded_array,
+    "support": coded_array,
+    "escapes": blob("7 bits a byte, low first"),
+    "data": coded_array,
+    "mask": coded_array,
     "state": blob("SHA-256"),
     "zstd": blob("Zstandard frame"),
 }
@@ -201,8 +206,26 @@ def shape_values(name: str, outline: Boundary, width: int, height: int) -> Itera
     yield from grid(cover.coverage(scaled, 0, 0, width, height))
 
 
-def texture_values(name: str, texture: ImplicitTexture) -> Iterator[str]:
-    """Lines of stored and filled codes."""
+def planes_values(number: int, planes: Planes) -> Iterator[str]:
+    """Lines of latents."""
+    levels, lowest = planes.latents
+    for colour in range(planes.components):
+        yield f"planes {number}, lowest plane of colour {colour}"
+        yield from grid(lowest[colour])
+    for level in range(len(levels), 0, -1):
+        for channel, latents in enumerate(levels[level - 1]):
+            if channel < 3 or level > planes.packed["grey"]:
+                yield f"planes {number}, level {level}, latents of channel {channel}"
+                yield from grid(latents)
+
+
+def texture_values(name: str, texture: Texture) -> Iterator[str]:
+    """Lines of stored and filled codes, or of the mask of a view."""
+    if isinstance(texture, PyramidTexture):
+        if texture.shown is not None:
+            yield f"layer {name!r}, samples that show"
+            yield from grid(texture.shown.astype(int))
+        return
     filled = fill(texture.codes, texture.stored)
     for f, codes in enumerate(texture.codes):
         yield f"layer {name!r}, codes of feature {f}"
@@ -218,7 +241,9 @@ def values(image: Image) -> Iterator[str]:
         for k, weights in enumerate(network.weights):
             yield f"network {i}, weights of linear layer {k}"
             yield from grid(weights)
-    shown: dict[ImplicitTexture, str] = {}
+    for i, planes in enumerate(image._planes()):
+        yield from planes_values(i, planes)
+    shown: dict[Texture, str] = {}
     for layer in image.layers:
         if layer.mesh is not None:
             yield from mesh_values(layer.name, layer.mesh.refined)

@@ -14,13 +14,14 @@ from pathlib import Path
 
 import numpy as np
 
-from proxyimg_codec.container import head, layr, mesh, meta, netw, pose, texr, tree, undo
+from proxyimg_codec.container import head, layr, mesh, meta, netw, plan, pose, texr, tree, undo
 from proxyimg_codec.container.fields import Field
 from proxyimg_codec.entropy import arrays
 from proxyimg_codec.geometry import deltas
 from proxyimg_codec.geometry import mesh as meshes
 from proxyimg_codec.image import from_bytes
 
+from . import pyramid
 from .dump import dump, values
 
 FOLDER = Path(__file__).parent
@@ -34,6 +35,8 @@ FIELDS = {
     "NETW": netw.FIELDS,
     "TEXR": texr.FIELDS,
     "TEXR shared": texr.SHARED_FIELDS,
+    "TEXR pyramid": texr.PYRAMID_FIELDS,
+    "PLAN": plan.FIELDS,
     "BLOCK": meta.FIELDS,
     "iNFO": meta.INFO_FIELDS,
     "tREE": tree.FIELDS,
@@ -144,9 +147,9 @@ def pixels() -> Iterator[str]:
         yield " ".join(bytes(p).hex() for p in row)
 
 
-def fenced(lines: Iterator[str]) -> Iterator[str]:
-    """Lines as a block of plain text."""
-    yield "```text"
+def fenced(lines: Iterator[str], language: str = "text") -> Iterator[str]:
+    """Lines as a block."""
+    yield f"```{language}"
     yield from lines
     yield "```"
 
@@ -156,6 +159,12 @@ PARTS: dict[str, Callable[[], Iterator[str]]] = {
     "example": lambda: fenced(small_example()),
     "mesh": lambda: fenced(mesh_example()),
     "mesh steps": mesh_steps,
+    "scales": lambda: fenced(pyramid.scales(), "python"),
+    "models": pyramid.models,
+    "registered": lambda: fenced(pyramid.registered(), "python"),
+    "layout": pyramid.layout,
+    "pyramid": lambda: fenced(pyramid.example()),
+    "pyramid steps": pyramid.steps,
     "dump": lambda: fenced(dump(EXAMPLE.read_bytes())),
     "values": lambda: fenced(values(from_bytes(EXAMPLE.read_bytes()))),
     "pixels": lambda: fenced(pixels()),

@@ -69,8 +69,25 @@ def small_pxi(tmp_path_factory, small_masks) -> Path:
     picture[small_masks["bar"]] //= 2
     regions = [Region(name, small_masks[name]) for name in ("bar", "disc")]
     path = tmp_path_factory.mktemp("small") / "small.pxi"
-    encode(picture, masks=regions, effort=1, jobs=1).save(path)
+    encode(picture, masks=regions, effort=1, jobs=1, texture="implicit").save(path)
     return path
+
+
+@pytest.fixture
+def made_up_planes(monkeypatch) -> None:
+    """Planes of files have the samples that `tests.pyramids` makes up, whatever they hold."""
+    from proxyimg_codec.texture import planes
+    from tests import pyramids
+
+    monkeypatch.setattr(planes, "unpack", pyramids.unpacked)
+
+
+@pytest.fixture
+def pyramid(made_up_planes):
+    """A picture of 64x48 pixels with the layers back, bar and disc, all views of one raster."""
+    from tests import pyramids
+
+    return pyramids.picture()
 
 
 @pytest.fixture(scope="session")

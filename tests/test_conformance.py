@@ -11,7 +11,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from conformance import invalid_posed, judge, make_cases, pixels, runner, wrong_decoders
+from conformance import invalid_posed, judge, make_cases, pixels, runner, symbols, wrong_decoders
 from conformance.cases import FOLDER, Case, Render, flags, load
 from conformance.judge import Ended
 from conformance.processes import command_decoder, expand
@@ -84,7 +84,7 @@ def test_the_suite_is_sound():
         }
         # RMS can never exceed peak: a larger limit would test nothing.
         assert all(0 < r.rms < r.peak < 0.5 for r in case.renders)
-    assert sum(f.stat().st_size for f in FOLDER.rglob("*.*")) < 1_000_000
+    assert sum(f.stat().st_size for f in FOLDER.rglob("*.*")) < 1_200_000
 
 
 def test_bases_of_refused_files_are_good():
@@ -105,23 +105,29 @@ def test_cases_differ_from_a_flat_picture():
 # Decoders.
 
 
+def own_latents(source):
+    """The hash of the package's latents."""
+    return Ended(0, symbols.digest(source.read_bytes()))
+
+
 def test_the_package_passes():
-    assert problems(runner.run(CASES, in_process)) == []
+    assert problems(runner.run(CASES, in_process, digester=own_latents)) == []
 
 
 def test_the_package_passes_without_its_kernel(no_kernel):
     assert not kernel.available()
-    assert problems(runner.run(CASES, in_process)) == []
+    assert problems(runner.run(CASES, in_process, digester=own_latents)) == []
 
 
 def test_the_package_passes_as_a_command(tmp_path, capsys, at_root):
     report = tmp_path / "report.json"
-    for pattern, kind in (("alpha", "png"), ("invalid-crc-t*", "npy"), ("pixel", "npy")):
+    runs = (("alpha", "png"), ("invalid-crc-t*", "npy"), ("pixel", "npy"), ("pyramid-r*", "npy"))
+    for pattern, kind in runs:
         options = ["--only", pattern, "--format", kind, "-j", "2", "--json", str(report)]
         assert runner.main(options) == 0
         assert "cases passed" in capsys.readouterr().out
     report = json.loads(report.read_text())
-    assert (report["cases"], report["failed"], len(report["results"])) == (1, [], 2)
+    assert (report["cases"], report["failed"], len(report["results"])) == (2, [], 3)
     assert report["results"][0]["passed"]
     assert report["results"][0]["peak"] < 0.05
 
@@ -193,9 +199,40 @@ CAUGHT = {
     "follows-parents": ("tree", "pixels", "moved"),
     "believes-histories": ("undo-stale", "exit", "undo"),
     "accepts-contradictions": ("invalid-opaque-moved", "exit", "opaque-posed"),
-    "reads-only-0.2": ("version-0-1", "exit", "layers"),
-    "reads-the-future": ("unsupported-version-0-3", "exit", "layers"),
+    "reads-only-0.3": ("version-0-2", "exit", "layers"),
+    "reads-the-future": ("unsupported-version-0-4", "exit", "layers"),
     "accepts-idle-poses": ("invalid-pose-rest", "exit", "moved"),
+    "causal-off-by-one": ("pyramid", "exit", "pyramid-sample"),
+    "causal-reversed": ("pyramid", "exit", "pyramid-sample"),
+    "context-floored": ("pyramid", "exit", "layers"),
+    "features-truncated": ("pyramid", "exit", "layers"),
+    "chroma-first": ("pyramid", "exit", "pyramid-grey"),
+    "waves-too-steep": ("pyramid", "exit", "pyramid-row"),
+    "ignores-support": ("pyramid-one-cell", "exit", "pyramid-sample"),
+    "context-not-mirrored": ("pyramid", "exit", "pyramid-one-level"),
+    "context-high-mirrored-as-low": ("pyramid", "exit", "pyramid-one-level"),
+    "synthesis-not-mirrored": ("pyramid-one-level", "pixels", "pyramid-sample"),
+    "ignores-shifts": ("pyramid-shifts", "exit", "pyramid"),
+    "ignores-grey-levels": ("pyramid-grey-levels", "exit", "pyramid"),
+    "one-level-set": ("pyramid", "exit", "pyramid-one-level"),
+    "ignores-step": ("pyramid", "pixels", "layers"),
+    "codes-certain-latents": ("pyramid-one-cell", "exit", "layers"),
+    "escapes-unsigned": ("pyramid-escapes", "exit", "pyramid-sample"),
+    "accepts-left-over-escapes": ("invalid-escapes-long", "exit", "pyramid"),
+    "accepts-large-latents": ("invalid-latent-high", "exit", "pyramid"),
+    "nearest-sample": ("pyramid-enlarged", "pixels", "pyramid-odd"),
+    "linear": ("pyramid-enlarged", "pixels", "pyramid-odd"),
+    "cubic-sharp": ("pyramid-enlarged", "pixels", "pyramid-odd"),
+    "samples-on-corners": ("pyramid-odd", "pixels", "pyramid-sample"),
+    "interpolates-straight": ("pyramid-alpha", "pixels", "pyramid-enlarged"),
+    "ignores-part": ("pyramid-part", "pixels", "pyramid"),
+    "ignores-alpha-planes": ("pyramid-alpha", "pixels", "pyramid"),
+    "ignores-mask": ("pyramid-moved", "pixels", "pyramid"),
+    "fills-black": ("pyramid-moved", "pixels", "pyramid"),
+    "ignores-cuts": ("pyramid-cuts", "pixels", "pyramid-moved"),
+    "cuts-mixed-samples": ("pyramid-cuts", "pixels", "pyramid-moved"),
+    "trusts-mixed-samples": ("pyramid-cuts", "pixels", "pyramid-moved"),
+    "trusts-samples-near": ("pyramid-cuts", "pixels", "pyramid-moved"),
     "exit-code-1": ("invalid-empty", "exit", "layers"),
     "exit-code-0": ("invalid-empty", "exit", "layers"),
 }
@@ -232,6 +269,33 @@ def test_a_wrong_decoder_is_caught_as_a_command(capsys, at_root):
     wrong = command("-m", "conformance.wrong_decoders", "--fault", "ignores-holes")
     assert runner.main(["--decoder", wrong, "--only", "hole"]) == 1
     assert "pixels: peak" in capsys.readouterr().out
+
+
+def test_wrong_latents_are_caught_as_a_command(capsys, at_root):
+    good = command("-m", "proxyimg_codec.cli.decode")
+    digest = f"{shlex.quote(sys.executable)} -c"
+    for code, problem in (
+        ("print('0' * 64)", f"latents: the hash is {'0' * 64} instead of"),
+        ("pass", "latents: the hash is missing instead of"),
+        ("import sys; sys.exit(3)", "exit: code 3 instead of 0"),
+    ):
+        wrong = f"{digest} {shlex.quote(code)} {{in}}"
+        options = ["--decoder", good, "--latents", wrong, "--only", "pyramid-sample"]
+        assert runner.main(options) == 1
+        assert problem in capsys.readouterr().out
+
+
+def test_only_cases_with_planes_have_latents():
+    for case in CASES:
+        planes = not case.error and b"PLAN" in case.input.read_bytes()
+        assert planes == bool(case.latents), case.name
+
+
+def test_digests_of_refused_files(capsys, monkeypatch):
+    for name, code in (("invalid-escapes-none", 4), ("unsupported-model", 5), ("pyramid", 0)):
+        monkeypatch.setattr(sys, "argv", ["symbols", str(BY_NAME[name].input)])
+        assert symbols.main() == code
+    assert capsys.readouterr().out == f"{BY_NAME['pyramid'].latents}\n"
 
 
 def test_a_hanging_decoder_is_stopped(capsys, at_root):

@@ -26,11 +26,23 @@ def test_old_files_decode_as_ever(file):
     assert rms < 0.01
 
 
-def test_old_files_are_saved_as_new_ones_with_the_same_pixels():
-    image = from_bytes((GOLDEN / "0.1" / "alpha.pxi").read_bytes())
+@pytest.mark.parametrize("name", ["0.1/alpha", "0.2/all-displaced", "0.2/edited"])
+def test_old_files_are_saved_as_new_ones_with_the_same_pixels(name):
+    image = from_bytes((GOLDEN / f"{name}.pxi").read_bytes())
     saved = image.to_bytes()
     assert (saved[8], saved[9]) == VERSION
-    np.testing.assert_array_equal(from_bytes(saved).render(), image.render())
+    again = from_bytes(saved)
+    np.testing.assert_array_equal(again.render(), image.render())
+    assert again.history == image.history
+
+
+def test_old_histories_lead_back():
+    """The six edits of this file, made by version 0.2, began with one of version 0.1."""
+    image = from_bytes((GOLDEN / "0.2" / "edited.pxi").read_bytes())
+    assert len(image.history) == 6
+    first = from_bytes((GOLDEN / "0.1" / "layers.pxi").read_bytes())
+    for edited in (image, from_bytes(image.to_bytes())):
+        assert edited.undone(6).to_bytes() == first.to_bytes()
 
 
 def test_no_version_is_forgotten():

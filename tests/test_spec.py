@@ -1,3 +1,4 @@
+import hashlib
 import importlib
 import re
 import sys
@@ -14,14 +15,14 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from conformance import pixels
 from conformance.cases import load
 from proxyimg_codec.container import chunks
-from proxyimg_codec.entropy import arrays, rans
+from proxyimg_codec.entropy import arrays, laplace, rans
 from proxyimg_codec.errors import FormatError
 from proxyimg_codec.geometry import boundary, coverage, deltas, mesh, pose, warp
 from proxyimg_codec.geometry.mesh import Base, Mesh
 from proxyimg_codec.geometry.pose import REST, Pose
 from proxyimg_codec.image import Image, Layer, Layers, from_bytes
 from proxyimg_codec.limits import Limits
-from proxyimg_codec.texture import diffusion
+from proxyimg_codec.texture import context, diffusion, model, planes, pyramid
 from proxyimg_codec.texture.implicit import ImplicitTexture
 from proxyimg_codec.texture.network import NetShape, Network
 from tests.geometry.test_mesh import lattice
@@ -30,7 +31,7 @@ ROOT = Path(__file__).parents[1]
 SPEC = ROOT / "spec"
 NUMBERED = sorted(SPEC.glob("[0-9]*.md"), key=lambda p: int(p.name.partition("-")[0]))
 CHAPTERS = {p.name: p.read_text("utf-8") for p in (SPEC / "README.md", *NUMBERED)}
-IDS = dict(enumerate(("CON", "CHK", "ENT", "GEO", "TEX", "REN", "MET", "SEC", "", "MSH"), 1))
+IDS = dict(enumerate(("CON", "CHK", "ENT", "GEO", "TEX", "REN", "MET", "SEC", "", "MSH", "PYR"), 1))
 PARTS = re.findall(r"^<!-- ((?!end )[^\n]+) -->$", "".join(CHAPTERS.values()), re.M)
 
 
@@ -40,12 +41,27 @@ def tool(name):
         return importlib.import_module(f"spec.{name}")
 
 
+def remembered(decode):
+    """A function that decodes equal maps once: several tests look at the same planes."""
+    known: dict = {}
+
+    def decode_planes(plan):
+        key = repr(plan)
+        if key not in known:
+            known[key] = decode(plan)
+        return known[key]
+
+    return decode_planes
+
+
 @pytest.fixture(scope="module")
 def program():
     """The names of the program that the Python blocks of the chapters make together."""
     blocks = re.findall(r"^```python\n(.*?)^```$", "".join(CHAPTERS.values()), re.M | re.S)
     names: dict = {}
     exec("\n".join(blocks), names)
+    names["MODELS"] = ROOT / names["MODELS"]
+    names["decode_planes"] = remembered(names["decode_planes"])
     return names
 
 
@@ -104,6 +120,7 @@ def table(chapter):
         ("4-geometry.md", (boundary, coverage), 5),
         ("5-texture.md", (diffusion,), 2),
         ("10-mesh-and-pose.md", (mesh, pose, warp), 17),
+        ("11-pyramid.md", (model, context, laplace, planes, pyramid), 10),
     ],
 )
 def test_constants_are_those_of_the_code(chapter, modules, count):
@@ -400,6 +417,66 @@ def close(got, want):
     return off.max(initial=0) <= 1
 
 
+def test_program_has_the_distributions_of_the_package(program):
+    tables = laplace.tables()
+    for row, ends in enumerate(tables.ends):
+        found = np.cumsum([0, *program["distribution"](row // 16, row % 16)])
+        assert ends[: len(found)].tolist() == found.tolist()
+        assert (ends[len(found) :] == 1 << 14).all()
+
+
+def random_planes(rng, size, levels, components, spread):
+    """Planes of random latents, with holes, shifts and escapes."""
+    columns, rows = (-(-n >> levels) for n in size)
+    found = []
+    for level in range(levels):
+        shape = 9, rows << (levels - 1 - level), columns << (levels - 1 - level)
+        values = np.rint(rng.laplace(0, spread, shape)) * (rng.random(shape) < 0.5)
+        values[3:] *= components == 3 and (level > 0 or spread < 100)
+        found.append(np.clip(values, -65535, 65535).astype(np.int32))
+    lowest = np.rint(rng.normal(0, 40, (3, rows, columns))).astype(np.int32)
+    lowest[1:] *= components == 3
+    cell = int(rng.integers(1, 4))
+    cells = rng.random(planes.cells_of(size, cell)) < 0.7
+    cells.flat[0] = True
+    shifts = tuple(rng.integers(-8, 8, 2 * levels).tolist())
+    step = int(rng.integers(0, 641))
+    latents = planes.Latents(tuple(found), lowest)
+    return planes.encoded(latents, size, step, cells, cell, components, 1, shifts)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_program_decodes_planes(program, seed):
+    rng = np.random.default_rng(seed)
+    size = tuple(rng.integers(1, 14, 2).tolist())
+    spread = (0.5, 8, 9000)[seed % 3]
+    made = random_planes(rng, size, 1 + seed % 4, 1 if seed == 4 else 3, spread)
+    fields = dict(made.packed)
+    lowest, levels = program["decode_planes"](fields)
+    want = planes.unpack(fields)
+    np.testing.assert_array_equal(lowest, want.latents.lowest)
+    for got, level in zip(levels, want.latents.levels, strict=True):
+        np.testing.assert_array_equal(got, level)
+    if spread < 100:
+        np.testing.assert_allclose(program["raster_of"](fields), want.raster, atol=1e-4)
+
+
+def test_sums_of_the_context_are_exact_in_single_precision():
+    """As chapter 11 says of all registered models: whatever the inputs, below 2**24."""
+    inputs = {"first": 127, "second": 255, "causal": 127, "mix": 255, "luma": 255,
+              "from_luma": 127, "chroma": 255}  # fmt: skip
+    for number in model.REGISTERED:
+        for level in model.registered(number).context:
+            step = np.abs(level.first_by_step.values) * 347 >> 8
+            for name, most in inputs.items():
+                weights = np.abs(getattr(level, name).values)
+                total = most * weights.reshape(len(weights), -1).sum(1)
+                if name != "causal":
+                    total = total + np.abs(getattr(level, f"{name}_bias").values)
+                total = total + (step + 1 if name == "first" else 0)
+                assert total.max() < 1 << 24, name
+
+
 CASES = [c for c in load() if not c.error]
 
 
@@ -413,9 +490,24 @@ def test_program_passes_the_conformance_suite(program, case):
     assert close(np.array(got), want)
 
 
+@pytest.mark.parametrize("case", [c for c in CASES if c.latents], ids=lambda c: c.name)
+def test_program_decodes_the_latents_of_the_conformance_suite(program, case):
+    found = hashlib.sha256()
+    chunks = program["read_chunks"](case.input.read_bytes())
+    for plan in program["maps"](chunks, "PLAN"):
+        lowest, levels = program["decode_planes"](plan)
+        for values in (lowest, *levels[::-1]):
+            found.update(np.array(values, "<i4").tobytes())
+    assert found.hexdigest() == case.latents
+
+
 def test_dump_covers_every_byte(small_pxi, example, capsys):
     dump = tool("dump")
-    posed = [c.input.read_bytes() for c in CASES if c.name in ("closing-deep", "shared", "undo")]
+    posed = [
+        c.input.read_bytes()
+        for c in CASES
+        if c.name in ("closing-deep", "shared", "undo", "pyramid-cells", "pyramid-escapes")
+    ]
     for data in (small_pxi.read_bytes(), example, *posed):
         assert sum(size for size, _ in dump.pieces(data)) == len(data)
     assert dump.main([str(SPEC / "example.pxi")]) == 0
@@ -436,5 +528,15 @@ def test_dump_prints_meshes_and_poses():
     for name in ("nodes", "texture"):
         assert f"layer 'disc', displacements of the {name} in 1/16 pixel" in lines
     assert "  matrix [10066329, 13421772, -13421773, 10066329] shift [12001, -6003]" in lines
+    lines = list(dump.values(from_bytes(data["pyramid-moved"])))
+    image = from_bytes(data["pyramid-moved"])
+    at = lines.index("planes 0, level 3, latents of channel 8")
+    (shown,) = {source for v in image.layers for source in v.texture.sources}
+    numbers = [[int(v) for v in line.split()] for line in lines[at + 1 : at + 4]]
+    assert numbers == shown.latents.levels[2][8].tolist()
+    at = lines.index("layer 'disc', samples that show")
+    assert (
+        lines[at + 6].split() == image.layers[1].texture.shown[5].astype(int).astype(str).tolist()
+    )
     lines = list(dump.values(from_bytes(data["shared"])))
     assert "layer 'copy' shows the texture of 'disc'" in lines

@@ -174,7 +174,7 @@ AVIF_QUALITIES = {
     "4:4:4": (7.0, 20.0, 32.0, 42.0, 51.0, 60.0, 72.0),
 }
 
-PXI_QUALITIES = (10.0, 25.0, 40.0, 50.0, 60.0, 75.0, 90.0)
+PXI_QUALITIES = (20.0, 31.0, 43.0, 55.0, 67.0)
 
 
 def avif(name: str, label: str, speed: int, subsampling: str, default: bool = True) -> Codec:

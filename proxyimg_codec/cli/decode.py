@@ -34,7 +34,8 @@ def arguments() -> argparse.ArgumentParser:
         "8 by default")  # fmt: skip
     add("--engine", choices=["auto", "numpy", "native", "ort"], default="auto",
         help="who runs the networks; auto is the fastest that is built in")  # fmt: skip
-    add("--export-onnx", metavar="FILE", help="write the decoder network as ONNX")
+    add("--export-onnx", metavar="FILE", help="write the decoder network as ONNX; of a pyramid "
+        "texture the synthesis of its colours")  # fmt: skip
     add("-f", "--force", action="store_true", help="replace files that exist")
     add("--quiet", action="store_true", help="print nothing but errors")
     return p
@@ -112,14 +113,22 @@ def target(args: argparse.Namespace) -> str:
 
 
 def export(image: Any, args: argparse.Namespace) -> None:
-    """Writes the network of the back layer, or of the one layer that was asked for."""
-    from ..export.onnx_network import build
+    """Writes the network or the synthesis of all layers, or of those that were asked for.
+
+    Raises:
+        UsageError: They have several.
+    """
+    from ..export import onnx_network, onnx_synthesis
     from ..files import write_atomically
 
-    indices = {layer.texture.network for layer in selected(image, args.layer)}
-    if len(indices) > 1:
-        raise UsageError("the layers have several networks; choose one layer with --layer")
-    model = build(image.networks[indices.pop()])
+    layers = selected(image, args.layer)
+    networks = {layer.network for layer in layers} - {None}
+    planes = {layer.texture.planes for layer in layers if layer.network is None}
+    if len(networks) + len(planes) > 1:
+        raise UsageError(
+            "the layers have several networks or planes; choose one layer with --layer"
+        )
+    model = onnx_synthesis.build(*planes) if planes else onnx_network.build(*networks)
     write_atomically(args.export_onnx, model.SerializeToString())
     if not args.quiet:
         print(f"{args.export_onnx}: ONNX opset {model.opset_import[0].version}", file=sys.stderr)

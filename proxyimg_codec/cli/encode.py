@@ -26,7 +26,17 @@ def arguments() -> argparse.ArgumentParser:
     p.add_argument("output", metavar="OUT", nargs="?", help=".pxi file, - for standard output; "
                    "IN with the suffix .pxi by default")  # fmt: skip
     add = p.add_argument
-    add("-q", "--quality", type=float, default=50, metavar="0-100", help="default 50")
+    add("-q", "--quality", type=float, metavar="0-100", help="default 50")
+    add("--target-bpp", type=float, metavar="B", help="bits a pixel of the whole file, hit within "
+        "2 %%, instead of -q")  # fmt: skip
+    add("--target-size", type=float, metavar="BYTES", help="bytes of the whole file, instead of -q")
+    add("--target-psnr", type=float, metavar="DB", help="PSNR of the decoded picture, instead of "
+        "-q")  # fmt: skip
+    add("--tune", choices=["mse", "ms-ssim"], default="mse", help="what to be good at: PSNR "
+        "(default), or MS-SSIM; texture pyramid")  # fmt: skip
+    add("--texture", choices=["auto", "implicit", "pyramid"], default="auto", help="coder: pyramid "
+        "(the smallest files), implicit (the paper's: a network in the file, resolution-free), or "
+        "auto: pyramid unless another flag needs implicit (default)")  # fmt: skip
     add("-e", "--effort", type=int, metavar="1-9", help="how long to optimize; default 5")
     add("--preset", choices=PRESET_NAMES, default="default",
         help="effort 2, 5 or 8; paper: the literal method of ProxyImg, 4-bit codes and network, "
@@ -38,12 +48,15 @@ def arguments() -> argparse.ArgumentParser:
         "others are added by plug-in packages")  # fmt: skip
     add("--boundary", choices=["lsq", "chamfer"], help="boundary fit: least squares "
         "(default), or the slower adaptive Chamfer fit of the paper")  # fmt: skip
-    add("--background", choices=["diffuse", "complete"], default="diffuse", help="hidden parts of "
-        "the back layer: filled when decoding (default), or optimized and stored")  # fmt: skip
-    add("--mesh", metavar="NAME", default="delaunay", help="who makes proxy nodes: delaunay "
-        "(default), triwild, ftetwild, or none")  # fmt: skip
+    add("--background", choices=["diffuse", "complete"], default="diffuse",
+        help="hidden parts of the back layer: filled when decoding (default), or optimized and "
+        "stored (implicit)")  # fmt: skip
+    add("--mesh", metavar="NAME", help="who makes proxy nodes: delaunay (default with texture "
+        "implicit), triwild, ftetwild, or none (default with pyramid: edits make "
+        "them)")  # fmt: skip
     add("--feature-bits", type=int, metavar="2-8", help="bits a code; from quality by default")
-    add("--net-bits", type=int, metavar="2-8", help="bits a network weight; default 8")
+    add("--net-bits", type=int, metavar="2-8", help="bits a network weight; default 8; "
+        "like --feature-bits for texture implicit")  # fmt: skip
     add("--seed", type=int, default=0, help="seed of everything random; default 0")
     add(
         "-j",
@@ -100,6 +113,7 @@ def encode_file(args: argparse.Namespace) -> None:
         "bpp": round(8 * len(data) / (image.width * image.height), 4),
         "psnr": None if quality is None else round(quality, 3),
         "layers": [layer.name for layer in image.layers],
+        "texture": "implicit" if image.networks else "pyramid",
         "seconds": round(time.perf_counter() - started, 2),
         "cpu_seconds": round(time.process_time() - cpu, 2),
     }
@@ -173,6 +187,10 @@ def settings_from(args: argparse.Namespace) -> Any:
     from ..encoder.settings import PRESETS, Settings
     from ..errors import UsageError
 
+    if args.quality is not None:
+        aims = [n for n in ("target_bpp", "target_size", "target_psnr") if getattr(args, n)]
+        if aims:
+            raise UsageError(f"--quality and --{aims[0].replace('_', '-')} contradict each other")
     rivals = [n for n in ("layers", "masks", "max_layers") if getattr(args, n) is not None]
     if args.segmenter is not None and (args.layers or args.masks):
         rivals.append("segmenter")
@@ -195,6 +213,7 @@ def describe(report: dict[str, Any]) -> str:
     return (
         f"{report['output']}: {report['width']}x{report['height']}, {report['bytes']} bytes, "
         f"{report['bpp']:.3f} bpp, PSNR {quality}, {len(report['layers'])} layers ({names}), "
+        f"{report['texture']}, "
         f"{report['seconds']:.1f} s"
     )
 

@@ -8,12 +8,16 @@ import sys
 from collections.abc import Mapping
 from typing import Any
 
+from ..container import texr
 from ..container.chunks import VERSION
 from ..container.file import Container, parse
 from ..files import read_bytes
 from .common import parser, printable, run
 
-CODERS = {1: "implicit"}
+CODERS = {texr.IMPLICIT: "implicit", texr.PYRAMID: "pyramid"}
+VIEWED = ("grid", "bits", "network", "planes", "part", "cuts")
+"""Fields of textures that are told as they are; a coder has not all of them."""
+
 SAMPLINGS = ("direct", "node", "node, local only", "node, global only")
 
 
@@ -54,9 +58,8 @@ def describe(c: Container, size: int) -> dict[str, Any]:
                 "area": area,
                 "segments": sum(layer["segments"]),
                 "coder": CODERS[texture["coder"]],
-                "grid": list(texture["grid"]),
-                "bits": texture["bits"],
-                "network": texture["network"],
+                **{k: texture.get(k) for k in VIEWED},
+                "alpha": texture["alpha"] - 1 if texture.get("alpha") else None,
                 "sampling": SAMPLINGS[layer["sampling"]],
                 "shares": c.textures[i].get("texture"),
                 "vertices": meshes[i]["vertices"] if i in meshes else None,
@@ -66,13 +69,18 @@ def describe(c: Container, size: int) -> dict[str, Any]:
                 "pose_bytes": _bytes(poses.get(i)),
                 "texture_bytes": 0
                 if texture is not c.textures[i]
-                else len(texture["codes"]) + len(texture["stored"]),
+                else sum(len(texture.get(k, b"")) for k in ("codes", "stored", "mask")),
             }
         )
     networks = [
         {k: n[k] for k in ("dim", "octaves", "hidden", "depth", "channels", "bits")}
         | {"bytes": len(n["weights"]) + len(n["steps"]) + len(n["biases"])}
         for n in c.networks
+    ]
+    planes = [
+        {k: p[k] for k in ("model", "size", "components", "levels")}
+        | {"q": round(2 ** (p["step"] / 64), 3), "bytes": _bytes(p)}
+        for p in c.planes
     ]
     return {
         "version": f"{VERSION[0]}.{VERSION[1]}",
@@ -84,6 +92,7 @@ def describe(c: Container, size: int) -> dict[str, Any]:
         "depth": c.head["depth"],
         "layers": layers,
         "networks": networks,
+        "planes": planes,
         "groups": c.tree["groups"] if c.tree else [],
         "edits": [step.operation for step in c.history],
         "metadata": {name: len(block) for name, block in c.blocks.items()},
@@ -141,13 +150,19 @@ def text(f: dict[str, Any]) -> str:
         sizes = [v[f"{part}_bytes"] for part in ("boundary", "mesh", "pose", "texture")]
         lines.append(
             f"layer {i} {v['name']!r}: {w}x{h} at {x},{y}{area}, {outline}{mesh}{pose}, "
-            f"{v['coder']}{sampling} {v['grid'][0]}x{v['grid'][1]} codes of {v['bits']} bits"
-            f"{shares}, {' + '.join(str(n) for n in sizes if n)} bytes"
+            f"{v['coder']}{sampling} {_texture(v)}"
+            f"{shares}, {' + '.join(str(n) for n in sizes if n) or 0} bytes"
         )
     for i, n in enumerate(f["networks"]):
         lines.append(
             f"network {i}: {n['dim']} features, {n['octaves']} octaves, {n['depth']} hidden layers "
             f"of {n['hidden']}, {n['channels']} outputs, {n['bits']} bits, {n['bytes']} bytes"
+        )
+    for i, p in enumerate(f["planes"]):
+        lines.append(
+            f"planes {i}: {p['size'][0]}x{p['size'][1]} {'grey' if p['components'] == 1 else 'RGB'}"
+            f" samples, {p['levels']} levels, step {p['q']:g}, model {p['model']}, "
+            f"{p['bytes']} bytes"
         )
     if f["groups"]:
         lines.append(f"groups: {', '.join(map(repr, f['groups']))}")
@@ -156,6 +171,17 @@ def text(f: dict[str, Any]) -> str:
     if f["encoder"]:
         lines.append(f"made by {f['encoder']!r}, {json.dumps(f['settings'])}")
     return "\n".join(lines)
+
+
+def _texture(layer: dict[str, Any]) -> str:
+    """What the texture of a layer is."""
+    if layer["part"] is None:
+        return f"{layer['grid'][0]}x{layer['grid'][1]} codes of {layer['bits']} bits"
+    x, y, width, height = layer["part"]
+    alpha = "" if layer["alpha"] is None else f" with alpha of planes {layer['alpha']}"
+    outlines = ", ".join(str(n) for n in layer["cuts"])
+    cuts = f" cut by layer{'s' * (len(layer['cuts']) > 1)} {outlines}" if outlines else ""
+    return f"{width}x{height} samples at {x},{y} of planes {layer['planes']}{alpha}{cuts}"
 
 
 if __name__ == "__main__":

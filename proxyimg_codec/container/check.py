@@ -9,7 +9,7 @@ from ..limits import Limits
 from . import mesh, pose, texr
 
 if TYPE_CHECKING:
-    from .file import Container
+    from .file import Container, Values
 
 
 def check(c: Container, limits: Limits) -> None:
@@ -39,6 +39,12 @@ def check(c: Container, limits: Limits) -> None:
     limits.check("gates", sum(values["gates"] for values in c.meshes))
     _check_layers(c)
     _check_tree(c)
+    _check_networks(c, limits)
+    _check_planes(c, limits)
+    _check_textures(c, limits)
+
+
+def _check_networks(c: Container, limits: Limits) -> None:
     parameters = 0
     for net in c.networks:
         if net["channels"] > c.head["channels"]:
@@ -48,7 +54,32 @@ def check(c: Container, limits: Limits) -> None:
         parameters += (encoded + 1) * width + (net["depth"] - 1) * (width + 1) * width
         parameters += (width + 1) * net["channels"]
     limits.check("parameters", parameters)
-    codes = 0
+
+
+def _check_planes(c: Container, limits: Limits) -> None:
+    """Checks PLAN, and that textures use all of them, in their order."""
+    samples = 0
+    for planes in c.planes:
+        columns, rows = (-(-n >> planes["levels"]) << planes["levels"] for n in planes["size"])
+        limits.check("wavefronts", columns + 3 * rows)
+        samples += columns * rows
+    limits.check("samples", samples)
+    used = 0
+    for texture in c.textures:
+        if texture["coder"] != texr.PYRAMID:
+            continue
+        for number in (texture["planes"], texture["alpha"] - 1):
+            if number >= len(c.planes):
+                raise FormatError(f"planes {number} do not exist", "chunk TEXR")
+            if number > used:
+                raise FormatError("planes are not in the order of their first use", "chunk PLAN")
+            used = max(used, number + 1)
+    if used < len(c.planes):
+        raise FormatError(f"planes {used} are not used", "chunk PLAN")
+
+
+def _check_textures(c: Container, limits: Limits) -> None:
+    codes = filled = covered = 0
     for i, (layer, own) in enumerate(zip(c.layers, c.textures, strict=True)):
         if min(layer["box"][2:]) < 1:
             raise FormatError("the box is empty", "chunk LAYR")
@@ -60,18 +91,71 @@ def check(c: Container, limits: Limits) -> None:
             raise FormatError("a shared texture has another number of features", "chunk TEXR")
         if texture["coder"] == texr.SHARED:
             raise FormatError("a shared texture is shared itself", "chunk TEXR")
-        if texture["network"] >= len(c.networks):
-            raise FormatError(f"network {texture['network']} does not exist", "chunk TEXR")
-        net = c.networks[texture["network"]]
-        if layer["sampling"] == 1 and net["dim"] % 2:
-            raise FormatError("node sampling needs an even number of features", "chunk LAYR")
-        if i == 0 and c.head["opaque"] and net["channels"] != 3:
+        pyramid = texture["coder"] == texr.PYRAMID
+        channels = _check_view(c, layer, texture) if pyramid else _check_implicit(c, layer, texture)
+        if i == 0 and c.head["opaque"] and channels != 3:
             raise FormatError("the back layer of an opaque file gives alpha", "chunk TEXR")
-        if own is texture:
-            columns, rows = texture["grid"]
-            limits.check("wavefronts", columns + 2 * rows)
-            codes += columns * rows * int(net["dim"])
+        if own is not texture:
+            continue
+        if pyramid:
+            _check_cuts(c, i)
+            area = own["part"][2] * own["part"][3]
+            filled += area if own["mask"] or own["cuts"] else 0
+            covered += area * len(own["cuts"])
+            if not own["mask"]:
+                continue
+        rows, columns = texr.mask_shape(own) if pyramid else own["grid"][::-1]
+        limits.check("wavefronts", columns + 2 * rows)
+        codes += columns * rows * (1 if pyramid else c.networks[own["network"]]["dim"])
     limits.check("codes", codes)
+    limits.check("filled", filled)
+    limits.check("covered", covered)
+
+
+def _check_implicit(c: Container, layer: Values, texture: Values) -> int:
+    """Checks an implicit texture; its channels."""
+    if texture["network"] >= len(c.networks):
+        raise FormatError(f"network {texture['network']} does not exist", "chunk TEXR")
+    net = c.networks[texture["network"]]
+    if layer["sampling"] == 1 and net["dim"] % 2:
+        raise FormatError("node sampling needs an even number of features", "chunk LAYR")
+    return int(net["channels"])
+
+
+def _check_view(c: Container, layer: Values, texture: Values) -> int:
+    """Checks a pyramid texture, whose planes exist; its channels."""
+    if layer["sampling"]:
+        raise FormatError("node sampling needs an implicit texture", "chunk LAYR")
+    columns, rows = c.planes[texture["planes"]]["size"]
+    x, y, width, height = texture["part"]
+    if min(width, height) < 1 or x + width > columns or y + height > rows:
+        raise FormatError("the part is empty or leaves the planes", "chunk TEXR")
+    if texture["cell"] and not texture["mask"]:
+        raise FormatError("cells without a mask", "chunk TEXR")
+    if not texture["alpha"]:
+        return 3
+    alpha = c.planes[texture["alpha"] - 1]
+    if alpha["components"] != 1 or alpha["size"] != [columns, rows]:
+        raise FormatError("planes of alpha are not grey, or of another size", "chunk TEXR")
+    if c.head["channels"] != 4:
+        raise FormatError("more channels than HEAD has", "chunk TEXR")
+    return 4
+
+
+def _check_cuts(c: Container, number: int) -> None:
+    """Checks the cuts of the pyramid texture of layer `number`."""
+    texture = c.textures[number]
+    cuts = texture["cuts"]
+    if not cuts:
+        return
+    if texture["mask"]:
+        raise FormatError("a mask and cuts", "chunk TEXR")
+    if texture["part"][2:] != c.layers[number]["box"][2:]:
+        raise FormatError("a part with cuts has not the size of the box", "chunk TEXR")
+    if cuts != sorted(set(cuts)) or cuts[0] < number or cuts[-1] >= len(c.layers):
+        raise FormatError("cuts do not ascend, lie behind, or do not exist", "chunk TEXR")
+    if not all(c.layers[k]["segments"] for k in cuts):
+        raise FormatError("a layer that cuts has no boundary", "chunk TEXR")
 
 
 def _check_layers(c: Container) -> None:

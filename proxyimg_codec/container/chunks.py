@@ -17,11 +17,12 @@ from ..errors import FormatError, UnsupportedError
 from ..limits import DEFAULT_LIMITS, Limits
 
 SIGNATURE = b"\x89PXI\r\n\x1a\n"
-VERSION = (0, 2)
+VERSION = (0, 3)
 """What is written."""
 
-READABLE = ((0, 1), (0, 2))
-"""What is read; 0.1 is 0.2 without meshes, poses and shared textures."""
+READABLE = ((0, 1), (0, 2), (0, 3))
+"""What is read: 0.2 is 0.3 without pyramid textures; 0.1 is 0.2 without meshes, poses and shared
+textures."""
 
 PREFIX = struct.Struct("<8sBBH")
 """Signature, major version, minor version, reserved (0)."""
@@ -54,9 +55,9 @@ class Chunk:
         return FRAME.size + len(self.payload) + 4
 
 
-def write(chunks: Iterable[Chunk]) -> bytes:
+def write(chunks: Iterable[Chunk], version: tuple[int, int] = VERSION) -> bytes:
     """The file made of `chunks`."""
-    parts = [PREFIX.pack(SIGNATURE, *VERSION, 0)]
+    parts = [PREFIX.pack(SIGNATURE, *version, 0)]
     for chunk in chunks:
         body = FRAME.pack(chunk.type.encode("ascii"), len(chunk.payload)) + chunk.payload
         parts += (body, struct.pack("<I", zlib.crc32(body)))
@@ -74,7 +75,7 @@ def _check_prefix(data: bytes) -> None:
     if (major, minor) not in READABLE:
         raise UnsupportedError(
             f"the file has format version {major}.{minor}, this program reads "
-            f"{' and '.join(f'{a}.{b}' for a, b in READABLE)}; update proxyimg-codec"
+            f"{', '.join(f'{a}.{b}' for a, b in READABLE)}; update proxyimg-codec"
         )
     if reserved:
         raise FormatError("reserved field is not zero", offset=10)

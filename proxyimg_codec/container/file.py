@@ -8,13 +8,13 @@ from typing import Any
 
 from ..errors import FormatError, UnsupportedError
 from ..limits import DEFAULT_LIMITS, Limits
-from . import check, head, layr, mesh, meta, netw, pose, texr, tree, undo
+from . import check, head, layr, mesh, meta, netw, plan, pose, texr, tree, undo
 from .chunks import Chunk, read, write
 from .fields import Field, pack, unpack
 
 Values = Mapping[str, Any]
 
-_STRUCTURE = (layr.TYPE, mesh.TYPE, pose.TYPE, netw.TYPE, texr.TYPE)
+_STRUCTURE = (layr.TYPE, mesh.TYPE, pose.TYPE, netw.TYPE, plan.TYPE, texr.TYPE)
 _SINGLE = {
     meta.INFO_TYPE: meta.INFO_FIELDS,
     tree.TYPE: tree.FIELDS,
@@ -32,6 +32,7 @@ class Container:
         layers: Fields of each LAYR, back to front.
         networks: Fields of each NETW.
         textures: Fields of each TEXR, one a layer.
+        planes: Fields of each PLAN.
         meshes: Fields of each MESH.
         poses: Fields of each POSE.
         tree: Fields of tREE, or None.
@@ -46,6 +47,7 @@ class Container:
     layers: tuple[Values, ...]
     networks: tuple[Values, ...]
     textures: tuple[Values, ...]
+    planes: tuple[Values, ...] = ()
     meshes: tuple[Values, ...] = ()
     poses: tuple[Values, ...] = ()
     tree: Values | None = None
@@ -76,7 +78,7 @@ def parse(data: bytes, limits: Limits = DEFAULT_LIMITS) -> Container:
         )
     header = _unpack(head.FIELDS, chunks[0])
     parts: dict[str, list[Values]] = {t: [] for t in _STRUCTURE}
-    fields = {m.TYPE: m.FIELDS for m in (layr, mesh, pose, netw)}
+    fields = {m.TYPE: m.FIELDS for m in (layr, mesh, pose, netw, plan)}
     blocks: dict[str, bytes] = {}
     single: dict[str, Values] = {}
     history: tuple[undo.Step, ...] = ()
@@ -115,8 +117,8 @@ def parse(data: bytes, limits: Limits = DEFAULT_LIMITS) -> Container:
         raise FormatError("must be empty", "chunk TAIL", chunks[-1].offset)
     container = Container(
         header, tuple(parts[layr.TYPE]), tuple(parts[netw.TYPE]), tuple(parts[texr.TYPE]),
-        tuple(parts[mesh.TYPE]), tuple(parts[pose.TYPE]), single.get(tree.TYPE), history,
-        blocks, single.get(meta.INFO_TYPE), tuple(extra), sizes,
+        tuple(parts[plan.TYPE]), tuple(parts[mesh.TYPE]), tuple(parts[pose.TYPE]),
+        single.get(tree.TYPE), history, blocks, single.get(meta.INFO_TYPE), tuple(extra), sizes,
     )  # fmt: skip
     check.check(container, limits)
     return container
@@ -135,15 +137,15 @@ def serialize(c: Container) -> bytes:
 
 
 def present(c: Container) -> list[Chunk]:
-    """All chunks but uNDO and TAIL: HEAD, LAYR, MESH, POSE, NETW, TEXR, metadata, others."""
+    """All chunks but uNDO and TAIL: HEAD, LAYR, MESH, POSE, NETW, PLAN, TEXR, metadata, others."""
     chunks = [Chunk(head.TYPE, pack(head.FIELDS, c.head))]
     for module, values in (
         (layr, c.layers), (mesh, c.meshes), (pose, c.poses), (netw, c.networks),
+        (plan, c.planes),
     ):  # fmt: skip
         chunks += [Chunk(module.TYPE, pack(module.FIELDS, v)) for v in values]
     for v in c.textures:
-        fields = texr.SHARED_FIELDS if v["coder"] == texr.SHARED else texr.FIELDS
-        chunks.append(Chunk(texr.TYPE, pack(fields, v)))
+        chunks.append(Chunk(texr.TYPE, pack(texr.CODERS[v["coder"]], v)))
     for name, block in c.blocks.items():
         chunks.append(Chunk(meta.BLOCKS[name], meta.compress(block)))
     if c.info is not None:

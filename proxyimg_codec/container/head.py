@@ -10,5 +10,5 @@ FIELDS = (
     Field("opaque", "int", "1 = layer 0 covers the whole canvas and gives no alpha.", 0, 1),
     Field("depth", "int", "Bits a sample of the original: a hint for output, 8 or 16.", 8, 16),
     Field("layers", "int", "Number of LAYR and of TEXR chunks.", 1, 1 << 16),
-    Field("networks", "int", "Number of NETW chunks.", 1, 1 << 16),
+    Field("networks", "int", "Number of NETW chunks.", 0, 1 << 16),
 )

@@ -1,14 +1,18 @@
 """TEXR: the texture of one layer, in the order of the layers."""
 
+from collections.abc import Mapping
+from typing import Any
+
 from ..errors import UnsupportedError
 from .fields import Field
 
 TYPE = "TEXR"
 
-SHARED, IMPLICIT = 0, 1
-"""Coders: the texture of an earlier layer; a plane of codes decoded by a network of the file."""
+SHARED, IMPLICIT, PYRAMID = 0, 1, 2
+"""Coders: the texture of an earlier layer; a plane of codes decoded by a network of the file; a
+view of planes."""
 
-_CODER = Field("coder", "int", "Texture coder: 0 = shared, 1 = implicit.", 0, 255)
+_CODER = Field("coder", "int", "Texture coder: 0 = shared, 1 = implicit, 2 = pyramid.", 0, 255)
 
 SHARED_FIELDS = (
     _CODER,
@@ -29,6 +33,22 @@ FIELDS = (
     Field("codes", "bin", "Coded array [D, rows, columns] of the stored codes."),
 )
 
+PYRAMID_FIELDS = (
+    _CODER,
+    Field("planes", "int", "Index of the planes that give colour.", 0, 1 << 16),
+    Field("alpha", "int", "0 = opaque, n = planes n - 1 give alpha.", 0, 1 << 16),
+    Field("part", "ints", "x, y, width, height in samples of what is shown, over the whole box.",
+          0, 1 << 24, items=4),
+    Field("cell", "int", "Side of a cell of the mask is 2^cell samples; 0 without a mask.", 0, 6),
+    Field("mask", "bin", "Coded array [1, rows, columns] of 1 bit: which cells of the part belong "
+          "to the layer; empty = all."),
+    Field("cuts", "ints", "Ascending numbers of layers whose boundaries tell which samples belong "
+          "to the layer, instead of a mask: its own, and layers in front.", 0, 1 << 16),
+)  # fmt: skip
+
+CODERS = {SHARED: SHARED_FIELDS, IMPLICIT: FIELDS, PYRAMID: PYRAMID_FIELDS}
+"""Fields by coder."""
+
 
 def fields_of(payload: bytes) -> tuple[Field, ...]:
     """The fields of a payload, by its coder; those of the implicit coder if it has none.
@@ -45,6 +65,13 @@ def fields_of(payload: bytes) -> tuple[Field, ...]:
             coder = int.from_bytes(first)
         elif first == b"\xcc" and second >= b"\x80":
             coder = int.from_bytes(second)
-    if coder not in (SHARED, IMPLICIT):
+    if coder not in CODERS:
         raise UnsupportedError(f"chunk TEXR: texture coder {coder} is not known")
-    return SHARED_FIELDS if coder == SHARED else FIELDS
+    return CODERS[coder]
+
+
+def mask_shape(fields: Mapping[str, Any]) -> tuple[int, int]:
+    """Rows and columns of cells over the part of a pyramid texture."""
+    _, _, width, height = fields["part"]
+    side = 1 << fields["cell"]
+    return -(-height // side), -(-width // side)

@@ -26,6 +26,9 @@ FIELDS = (
     Field("zstd", "bin", "The history as one zstd frame."),
 )
 
+FIRST_VERSION = (0, 2)
+"""Version of the prefix that `state` covers, whatever that of the file."""
+
 STEPS_MAX = 1 << 12
 """Most steps that a file keeps; earlier ones are forgotten."""
 
@@ -102,8 +105,8 @@ def decode(
 
 
 def digest(chunks: Sequence[Chunk]) -> bytes:
-    """What binds a history to the state it leads to."""
-    return hashlib.sha256(write(chunks)).digest()
+    """What binds a history to the state it leads to, in whichever version that is written."""
+    return hashlib.sha256(write(chunks, FIRST_VERSION)).digest()
 
 
 def _chunk(type_: Any, payload: Any) -> Chunk:

@@ -16,6 +16,8 @@ from ..geometry.mesh import FRACTION_BITS
 from ..geometry.pose import COLOUR_BITS, COLOUR_MAX, NODE_BITS, NODE_MAX, OPACITY_MAX
 from ..geometry.warp import WEIGHT_BITS, barycentric
 from ..image import Image, Layer, open_image
+from ..texture.network import Network
+from ..texture.pyramid import PyramidTexture, Texture
 from .geometry import TARGET, meshed, sampled
 from .operations import changed, one, operation, shown_together, substituted
 
@@ -122,13 +124,7 @@ def texture(
         shown = origin.texture
     else:
         origin = _loaded(source, from_layer)
-        assert origin.image is not None
-        brought = origin.image.networks[origin.texture.network]
-        same = (i for i, v in enumerate(networks) if v.packed == brought.packed)
-        number = next(same, len(networks))
-        if number == len(networks):
-            networks.append(brought)
-        shown = replace(origin.texture, network=number)
+        shown = _brought(image, origin, networks)
     if origin.sampling and fit == "shape":
         raise UsageError(
             f"texture: layer {origin.name!r} has its features at its own nodes, which do not fit "
@@ -143,6 +139,30 @@ def texture(
         new = replace(new, pose=replace(new.pose, places=None))
     layers = [new if v.name == target.name else v for v in image.layers]
     return changed(image, layers, networks=networks)
+
+
+def _brought(image: Image, origin: Layer, networks: list[Network]) -> Texture:
+    """The texture of another image's layer as one of `image`, whose `networks` may grow.
+
+    Planes come as a whole, with what other layers of their file show of them. A network or planes
+    that the image has already are taken from there.
+    """
+    texture = origin.texture
+    if isinstance(texture, PyramidTexture):
+        views = (v.texture for v in image.layers if isinstance(v.texture, PyramidTexture))
+        known = [p for view in views for p in view.sources]
+        own, *alpha = (
+            next((p for p in known if p.packed == source.packed), source)
+            for source in texture.sources
+        )
+        return replace(texture, planes=own, alpha=alpha[0] if alpha else None)
+    brought = origin.network
+    assert brought is not None
+    same = (i for i, v in enumerate(networks) if v.packed == brought.packed)
+    number = next(same, len(networks))
+    if number == len(networks):
+        networks.append(brought)
+    return replace(texture, network=number)
 
 
 def _loaded(source: str, name: str | int | None) -> Layer:

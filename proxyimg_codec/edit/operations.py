@@ -224,7 +224,7 @@ def changed(
         image,
         layers=Layers(layers),
         networks=tuple(kept),
-        channels=max(image.channels, *(network.shape.channels for network in kept)),
+        channels=max(image.channels, *(v.texture.channels(kept) for v in layers)),
         opaque=image.opaque if layers[0] is image.layers[0] else _covers(layers[0], kept),
         groups=image.groups if groups is None else groups,
         info=_info(image, layers),
@@ -236,7 +236,7 @@ def _covers(back: Layer, networks: Sequence[Network]) -> bool:
     """Whether a back layer covers the whole canvas and lets nothing through."""
     still = back.boundary is None and not back.pose.affine and back.pose.nodes is None
     visible = back.pose.opacity == OPACITY_MAX and not back.pose.hidden
-    return still and visible and networks[back.texture.network].shape.channels == 3
+    return still and visible and back.texture.channels(networks) == 3
 
 
 def _info(image: Image, layers: Sequence[Layer]) -> Mapping[str, Any] | None:

@@ -82,6 +82,11 @@ def encode(
     premultiplied = picture.copy()
     premultiplied[..., :3] *= picture[..., 3:]
     plan = with_meshes(premultiplied, plan, settings)
+    if settings.pyramid and not plain(premultiplied):
+        from .pyramid.picture import encode_picture
+
+        image = encode_picture(picture, plan, settings, report)
+        return replace(image, depth=depth, blocks=dict(blocks or {}))
     outlines = [layer.boundary for layer in plan.layers]
 
     def problem_of(shape: NetShape, spacing: float) -> Problem:
@@ -92,6 +97,11 @@ def encode(
 
     image = fit_image(problem_of, height * width, plan, (width, height), settings, report)
     return replace(image, depth=depth, blocks=dict(blocks or {}))
+
+
+def plain(picture: Floats) -> bool:
+    """Whether a picture [H, W, C] is of one colour."""
+    return bool((picture == picture[0, 0]).all())
 
 
 def fit_image(
@@ -190,12 +200,12 @@ def _fit(
         from .fit_node import fit_quantized
 
         state = fit_quantized(
-            problem, settings.steps, settings.bits, settings.net_bits, settings.seed,
+            problem, settings.steps, settings.bits, settings.weight_bits, settings.seed,
             settings.device, step,
         )  # fmt: skip
     else:
         state = fit.fit(
-            problem, settings.steps, settings.bits, settings.net_bits, settings.seed,
+            problem, settings.steps, settings.bits, settings.weight_bits, settings.seed,
             settings.device, settings.jobs, step,
         )  # fmt: skip
     stored = problem.stored()
@@ -212,7 +222,7 @@ def constant(problem: Problem, settings: Settings) -> fit.State:
     state.codes[:] = 0
     state.weights[:] = 0
     fit.rows_of(problem.shape, state.weights)[-1][1][:] = problem.target[0]
-    state.code_bits, state.net_bits = settings.bits, settings.net_bits
+    state.code_bits, state.net_bits = settings.bits, settings.weight_bits
     return state
 
 
@@ -226,9 +236,9 @@ def assemble(
     steps = np.split(state.row_steps, ends)
     network = Network(
         shape,
-        settings.net_bits,
+        settings.weight_bits,
         tuple(
-            fit.quantize(w, s[:, None], settings.net_bits)
+            fit.quantize(w, s[:, None], settings.weight_bits)
             for (w, _), s in zip(rows, steps, strict=True)
         ),
         state.row_steps.astype(np.float16),

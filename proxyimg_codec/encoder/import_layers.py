@@ -15,9 +15,10 @@ import numpy as np
 
 from ..errors import InputError
 from ..geometry.pose import OPACITY_MAX, Pose
-from ..image import Image, Layers
+from ..image import Image, Layer, Layers
 from ..limits import DEFAULT_LIMITS
-from ..texture.network import Floats, NetShape
+from ..texture.implicit import ImplicitTexture
+from ..texture.network import Floats, NetShape, Network
 from .encode import Progress, check_blocks, fit_image, to_float
 from .layers import LayerPlan, Plan, plan_layers
 from .masks import unique_names
@@ -111,11 +112,15 @@ def _merged(parts: Sequence[Image], picture: LayeredPicture, opaque: bool) -> Im
     paths = {s.groups[: i + 1]: "" for s in sources for i in range(len(s.groups))}
     names = unique_names([*(s.name for s in sources), *(path[-1] for path in paths)])
     paths = dict(zip(paths, names[len(sources) :], strict=True))
-    fitted = {
-        layer.name: replace(layer, texture=replace(layer.texture, network=i))
-        for i, part in enumerate(parts)
-        for layer in part.layers
-    }
+    fitted: dict[str, Layer] = {}
+    networks: list[Network] = []
+    for part in parts:
+        for layer in part.layers:
+            texture = layer.texture
+            if isinstance(texture, ImplicitTexture):
+                texture = replace(texture, network=texture.network + len(networks))
+            fitted[layer.name] = replace(layer, texture=texture)
+        networks += part.networks
     layers = [
         replace(
             fitted[s.name],
@@ -130,7 +135,7 @@ def _merged(parts: Sequence[Image], picture: LayeredPicture, opaque: bool) -> Im
         opaque=opaque,
         depth=16 if any(s.pixels.dtype == np.uint16 for s in sources) else 8,
         layers=Layers(layers),
-        networks=tuple(network for part in parts for network in part.networks),
+        networks=tuple(networks),
         blocks=dict(picture.blocks),
         info={**(parts[0].info or {}), "areas": _areas(picture)},
         groups={name: paths.get(path[:-1]) for path, name in paths.items()},

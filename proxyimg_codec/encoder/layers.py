@@ -71,7 +71,8 @@ def plan_layers(picture: Floats, settings: Settings, masks: Sequence[Region] | N
     support = None if opaque else alpha >= 0.5
     if support is not None and soft:
         # Crisp outlines stay where they are; only translucent parts reach beyond.
-        support |= _dilate(translucent, 3) & (alpha > 0)
+        around = _dilate(translucent, 3)
+        support |= around if settings.pyramid else around & (alpha > 0)
     if support is not None and not support.any():
         return Plan((LayerPlan("empty", None),), 4, False)
     if masks is not None:
@@ -85,6 +86,8 @@ def plan_layers(picture: Floats, settings: Settings, masks: Sequence[Region] | N
         segment = plugins.find("segmenters", settings.segmenter)
         regions = segment(rgb, settings.max_layers, support)
     outline = alpha if not opaque and not soft and height * width <= FINE_PIXELS else None
+    # Planes hold one alpha a sample: layers on top of each other would show it twice.
+    overlap = 0 if soft and settings.pyramid else OVERLAP
     layers = []
     for k, region in enumerate(regions):
         if opaque and k == 0:
@@ -93,7 +96,7 @@ def plan_layers(picture: Floats, settings: Settings, masks: Sequence[Region] | N
         front = np.zeros((height, width), bool)
         for other in regions[k + 1 :]:
             front |= other.mask
-        mask = region.mask | (_dilate(region.mask, OVERLAP) & front)
+        mask = region.mask | (_dilate(region.mask, overlap) & front)
         layers.append(LayerPlan(region.name, _boundary(mask, outline, settings)))
     return Plan(tuple(layers), 4 if soft else 3, opaque)
 

@@ -32,16 +32,16 @@ def with_meshes(picture: Floats, plan: Plan, settings: Settings) -> Plan:
     Args:
         picture: float32 [H, W, 4], premultiplied.
         plan: Layers back to front.
-        settings: ``mesh`` is the name of a mesher, or ``none``.
+        settings: ``mesher`` is the name of a mesher, or ``none``.
 
     Raises:
         UsageError: There is no such mesher.
         InputError: An external mesher failed.
     """
     lone = len(plan.layers) == 1 and plan.layers[0].boundary is None
-    if settings.mesh == "none" or (lone and settings.sampling == "direct"):
+    if settings.mesher == "none" or (lone and settings.sampling == "direct"):
         return plan
-    mesher: Mesher = plugins.find("meshers", settings.mesh)
+    mesher: Mesher = plugins.find("meshers", settings.mesher)
     detail = gradient(picture)
     size = (picture.shape[1], picture.shape[0])
     layers = []

@@ -145,7 +145,7 @@ def build(
     parts: list[Entries] = []
     areas = [0] * len(planes)
     for k in range(len(planes) - 1, -1, -1):
-        share = _share(boundaries[k], width, height)
+        share = coverage_of(boundaries[k], width, height)
         at = np.flatnonzero((share > 0) & (clear > 0))
         areas[k] = round(float((share[at] * clear[at]).sum(dtype=np.float64)))
         seen.append(at)
@@ -185,7 +185,7 @@ def build_apart(
     targets: list[Floats] = []
     areas: list[int] = []
     for k, plane in enumerate(planes):
-        share = _share(boundaries[k], width, height)
+        share = coverage_of(boundaries[k], width, height)
         areas.append(round(float(share.sum(dtype=np.float64))))
         at = np.flatnonzero(share > 0)
         target = picture_of(k).reshape(-1, 4)[at]
@@ -284,7 +284,7 @@ def prior_of(
     )
 
 
-def _share(boundary: Boundary | None, width: int, height: int) -> Floats:
+def coverage_of(boundary: Boundary | None, width: int, height: int) -> Floats:
     """Coverage [width * height], 0..1."""
     paths = outline(boundary, View(0, 0, width, height, width, height))
     if paths is None:

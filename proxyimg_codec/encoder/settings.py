@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 from ..errors import UsageError
@@ -14,7 +14,13 @@ PRESETS: dict[str, dict[str, Any]] = {
     "fast": {"effort": 2},
     "default": {"effort": 5},
     "best": {"effort": 8},
-    "paper": {"sampling": "node", "boundary": "chamfer", "feature_bits": 4, "net_bits": 4},
+    "paper": {
+        "texture": "implicit",
+        "sampling": "node",
+        "boundary": "chamfer",
+        "feature_bits": 4,
+        "net_bits": 4,
+    },
 }
 """Settings of each preset, where they differ from the defaults; ``paper`` is ProxyImg's method."""
 
@@ -27,6 +33,8 @@ NODE_SHARE = 0.3
 NODE_SPACING = 8.0
 """Canvas pixels between codes at quality 50 with node sampling (ProxyImg, o)."""
 
+TEXTURES = ("auto", "implicit", "pyramid")
+TUNES = ("mse", "ms-ssim")
 SAMPLINGS = ("direct", "node")
 BOUNDARIES = ("lsq", "chamfer")
 BACKGROUNDS = ("diffuse", "complete")
@@ -37,18 +45,26 @@ class Settings:
     """What an encode is asked for.
 
     Attributes:
-        quality: 0..100; sets density of codes, bits and width of the network.
+        quality: 0..100. Pyramid: sets the quantization step, about 0.05 to 2 bits a pixel on
+            photographs. Implicit: sets density of codes, bits and width of the network.
         effort: 1..9; sets the number of optimizer steps.
+        texture: The coder: ``pyramid``, ``implicit``, or ``auto``: implicit where a setting asks
+            for what only that has, or a picture has a single colour; else pyramid.
+        tune: ``mse``, or ``ms-ssim``: errors count less where there is much texture; pyramid alone.
+        target_bpp: Bits a pixel of the whole file, instead of quality; pyramid alone, as are:
+        target_size: Bytes of the whole file.
+        target_psnr: PSNR in dB of the decoded picture.
         max_layers: Most layers of the decomposition; 1 = none.
         segmenter: Who decomposes; see `plugins`.
-        feature_bits: Bits a code, 2..8; None = from quality.
-        net_bits: Bits a weight, 2..8.
+        feature_bits: Bits a code, 2..8; None = from quality. Implicit alone, as is:
+        net_bits: Bits a weight, 2..8; None = 8.
         sampling: ``direct``, or ``node`` (the paper's method: features from mesh and boundary, and
             its network, whatever the quality).
         boundary: ``lsq`` (least squares) or ``chamfer`` (the paper's fit).
         background: ``diffuse`` (hidden codes of the back layer are filled when decoding) or
             ``complete`` (they are optimized for smoothness and stored).
-        mesh: Who makes proxy nodes, see `plugins`; ``none`` leaves them out.
+        mesh: Who makes proxy nodes, see `plugins`; ``none`` leaves them out, so that edits make
+            them when needed; None = delaunay for implicit textures, else none.
         seed: Seed of everything random.
         jobs: Threads, at least 1.
         device: ``cpu`` or ``cuda``.
@@ -56,39 +72,53 @@ class Settings:
 
     quality: float = 50.0
     effort: int = 5
+    texture: str = "auto"
+    tune: str = "mse"
+    target_bpp: float | None = None
+    target_size: float | None = None
+    target_psnr: float | None = None
     max_layers: int = 4
     segmenter: str = "regions"
     feature_bits: int | None = None
-    net_bits: int = 8
+    net_bits: int | None = None
     sampling: str = "direct"
     boundary: str = "lsq"
     background: str = "diffuse"
-    mesh: str = "delaunay"
+    mesh: str | None = None
     seed: int = 0
     jobs: int = 2
     device: str = "cpu"
 
     def __post_init__(self) -> None:
         try:
-            object.__setattr__(self, "quality", float(self.quality))
+            for name in ("quality", "target_bpp", "target_size", "target_psnr"):
+                if getattr(self, name) is not None:
+                    object.__setattr__(self, name, float(getattr(self, name)))
             for name in ("effort", "max_layers", "net_bits", "seed", "jobs", "feature_bits"):
                 value = getattr(self, name)
-                if name != "feature_bits" or value is not None:
+                if value is not None:
                     object.__setattr__(self, name, operator.index(value))
         except (TypeError, ValueError):
-            raise UsageError("quality must be a number, other numeric settings integers") from None
+            raise UsageError("quality and targets must be numbers, other numeric settings "
+                             "integers") from None  # fmt: skip
         checks = [
             (math.isfinite(self.quality) and 0 <= self.quality <= 100, "quality", "0..100"),
             (1 <= self.effort <= 9, "effort", "1..9"),
+            (self.texture in TEXTURES, "texture", " or ".join(TEXTURES)),
+            (self.tune in TUNES, "tune", " or ".join(TUNES)),
             (1 <= self.max_layers <= 64, "max_layers", "1..64"),
             (self.feature_bits is None or 2 <= self.feature_bits <= 8, "feature_bits", "2..8"),
-            (2 <= self.net_bits <= 8, "net_bits", "2..8"),
+            (self.net_bits is None or 2 <= self.net_bits <= 8, "net_bits", "2..8"),
             (self.sampling in SAMPLINGS, "sampling", " or ".join(SAMPLINGS)),
             (self.boundary in BOUNDARIES, "boundary", " or ".join(BOUNDARIES)),
             (self.background in BACKGROUNDS, "background", " or ".join(BACKGROUNDS)),
             (0 <= self.seed < 1 << 32, "seed", "0..2^32-1"),
             (self.jobs >= 1, "jobs", "at least 1"),
             (self.device in ("cpu", "cuda"), "device", "cpu or cuda"),
+        ]
+        checks += [
+            (value is None or (math.isfinite(value) and value > 0), f"target_{kind}", "positive")
+            for kind, value in self._targets().items()
         ]
         for good, name, allowed in checks:
             if not good:
@@ -97,10 +127,69 @@ class Settings:
             raise UsageError("sampling node needs a mesh; mesh none contradicts it")
         if self.sampling == "node" and self.background == "complete":
             raise UsageError("background complete needs sampling direct")
+        self._check_coders()
+
+    def _check_coders(self) -> None:
+        """Refuses settings of both coders at once."""
+        aims = [f"target_{k}" for k, v in self._targets().items() if v is not None]
+        if len(aims) > 1:
+            raise UsageError(f"{' and '.join(aims)} contradict each other")
+        aims += ["tune ms-ssim"] if self.tune != "mse" else []
+        only = self._implicit_alone()
+        if aims and only:
+            raise UsageError(f"{only[0]} needs texture implicit, {aims[0]} texture pyramid")
+        if self.texture == "pyramid" and only:
+            raise UsageError(f"{only[0]} needs texture implicit")
+        if self.texture == "implicit" and aims:
+            raise UsageError(f"{aims[0]} needs texture pyramid")
+
+    def _targets(self) -> dict[str, float | None]:
+        return {"bpp": self.target_bpp, "size": self.target_size, "psnr": self.target_psnr}
+
+    def _implicit_alone(self) -> list[str]:
+        """The settings that are given and mean something to the implicit coder only."""
+        given = {
+            "sampling node": self.sampling != "direct",
+            "background complete": self.background != "diffuse",
+            "feature_bits": self.feature_bits is not None,
+            "net_bits": self.net_bits is not None,
+            "device cuda": self.device != "cpu",
+        }
+        return [name for name, there in given.items() if there]
+
+    @property
+    def target(self) -> tuple[str, float] | None:
+        """``bpp``, ``size`` or ``psnr`` and its value, if there is one to be met."""
+        found = [(k, v) for k, v in self._targets().items() if v is not None]
+        return found[0] if found else None
+
+    @property
+    def pyramid(self) -> bool:
+        """Whether textures are pyramids, pictures of a single colour excepted."""
+        if self.texture == "auto":
+            return not self._implicit_alone()
+        return self.texture == "pyramid"
+
+    @property
+    def mesher(self) -> str:
+        """Who makes proxy nodes."""
+        return self.mesh or ("none" if self.pyramid else "delaunay")
+
+    @property
+    def weight_bits(self) -> int:
+        """Bits a weight of the implicit coder's network."""
+        return self.net_bits or 8
+
+    @property
+    def step(self) -> int:
+        """Quantization step of the pyramid, 2**(step / 64): 512 at quality 0, 128 at 100."""
+        return round(512 - 3.84 * self.quality)
 
     @property
     def steps(self) -> int:
-        """Optimizer steps."""
+        """Optimizer steps, as progress is told in."""
+        if self.pyramid:
+            return 1000
         steps = EFFORT_STEPS[self.effort - 1]
         return round(NODE_SHARE * steps) if self.sampling == "node" else steps
 
@@ -133,5 +222,13 @@ class Settings:
         return NetShape(8, 5, max(4 * round(width / 4), 8), 2, channels)
 
     def record(self) -> dict[str, Any]:
-        """What is written into the file about its making; nothing of the machine."""
-        return {k: v for k, v in asdict(self).items() if k not in ("jobs", "device")}
+        """What is written into the file about its making: what differs from the defaults.
+
+        Nothing of the machine.
+        """
+        usual = {f.name: f.default for f in fields(self)}
+        return {
+            k: v
+            for k, v in asdict(self).items()
+            if k not in ("jobs", "device") and v != usual.get(k)
+        }

@@ -8,10 +8,12 @@ few array operations. The encoder runs backwards, hence it records everything fi
 from __future__ import annotations
 
 import functools
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import kernel
 from ..errors import FormatError
 
 SCALE_BITS = 14
@@ -21,6 +23,8 @@ LOW = 1 << 16
 """States stay in LOW .. 2**32 - 1; encoding starts, and decoding ends, with every state at LOW."""
 
 MAX_LANES_LOG2 = 10
+
+TOO_SHORT = "entropy-coded stream ends too early"
 
 _SLOT_MASK = np.uint64((1 << SCALE_BITS) - 1)
 _SCALE_SHIFT, _WORD_SHIFT, _LOW = np.uint64(SCALE_BITS), np.uint64(16), np.uint64(LOW)
@@ -39,37 +43,75 @@ def _row_starts(count: int, width: int) -> NDArray[np.int64]:
 class Encoder:
     """Collects (start, frequency) pairs in decoding order; `finish` returns the stream."""
 
-    def __init__(self, lanes_log2: int) -> None:
+    def __init__(self, lanes_log2: int | None = None) -> None:
+        """A stream with 2**lanes_log2 states; None = as many as its size is worth."""
         self._lanes_log2 = lanes_log2
-        self._groups: list[tuple[NDArray[np.uint64], NDArray[np.uint64]]] = []
+        self._starts: list[NDArray[np.uint16]] = []
+        self._freqs: list[NDArray[np.uint16]] = []
+        self._ends: list[NDArray[np.int64]] = []
+        self._count = 0
 
     def put(self, start: NDArray[np.integer], freq: NDArray[np.integer]) -> None:
         """Adds symbols with cumulative frequency `start` [N] and frequency `freq` [N] >= 1."""
-        lanes = 1 << self._lanes_log2
-        for i in range(0, len(start), lanes):
-            self._groups.append(
-                (start[i : i + lanes].astype(np.uint64), freq[i : i + lanes].astype(np.uint64))
-            )
+        self.put_groups(
+            start.astype(np.uint16), freq.astype(np.uint16), np.array([len(start)], np.int64)
+        )
+
+    def put_groups(
+        self, start: NDArray[np.uint16], freq: NDArray[np.uint16], ends: NDArray[np.int64]
+    ) -> None:
+        """Adds groups of symbols; `ends` has the number of symbols up to the end of each."""
+        self._starts.append(start)
+        self._freqs.append(freq)
+        self._ends.append(ends + self._count)
+        self._count += len(start)
+
+    def bits(self) -> float:
+        """Information in what was put so far."""
+        freq = np.concatenate([np.ones(0, np.uint16), *self._freqs])
+        return SCALE_BITS * len(freq) - float(np.log2(freq, dtype=np.float64).sum())
 
     def finish(self) -> bytes:
         """The stream: u8 lanes_log2, u32 states, u32 number of words, u16 words."""
-        state = np.full(1 << self._lanes_log2, LOW, np.uint64)
-        words: list[NDArray[np.uint16]] = []
-        for start, freq in reversed(self._groups):
-            x = state[: len(freq)]
-            over = x >= freq << np.uint64(32 - SCALE_BITS)
-            words.append((x[over] & np.uint64(0xFFFF)).astype(np.uint16))
-            x = np.where(over, x >> np.uint64(16), x)
-            state[: len(freq)] = ((x // freq) << np.uint64(SCALE_BITS)) + x % freq + start
-        flat = np.concatenate(words[::-1]) if words else np.zeros(0, np.uint16)
+        lanes_log2 = self._lanes_log2
+        if lanes_log2 is None:
+            lanes_log2 = min(max((int(self.bits()) // 4096).bit_length() - 1, 0), MAX_LANES_LOG2)
+        start = np.concatenate([np.zeros(0, np.uint16), *self._starts])
+        freq = np.concatenate([np.zeros(0, np.uint16), *self._freqs])
+        ends = np.concatenate([np.zeros(0, np.int64), *self._ends])
+        states = np.full(1 << lanes_log2, LOW, np.uint32)
+        if kernel.available():
+            words = kernel.rans_encode(start, freq, ends, SCALE_BITS, states)
+        else:
+            words = _encoded(start, freq, ends, states)
         return b"".join(
             (
-                bytes([self._lanes_log2]),
-                state.astype("<u4").tobytes(),
-                len(flat).to_bytes(4, "little"),
-                flat.astype("<u2").tobytes(),
+                bytes([lanes_log2]),
+                states.astype("<u4").tobytes(),
+                len(words).to_bytes(4, "little"),
+                words.astype("<u2").tobytes(),
             )
         )
+
+
+def _encoded(
+    start: NDArray[np.uint16], freq: NDArray[np.uint16], ends: NDArray[np.int64],
+    states: NDArray[np.uint32],
+) -> NDArray[np.uint16]:  # fmt: skip
+    """Words of the stream; `states` move on."""
+    lanes, state = len(states), states.astype(np.uint64)
+    words = [np.zeros(0, np.uint16)]
+    for first, end in reversed(list(pairwise([0, *ends.tolist()]))):
+        for i in range(first + (end - first - 1) // lanes * lanes, first - 1, -lanes):
+            at = slice(i, min(i + lanes, end))
+            own = freq[at].astype(np.uint64)
+            x = state[: len(own)]
+            over = x >= own << np.uint64(32 - SCALE_BITS)
+            words.append((x[over] & np.uint64(0xFFFF)).astype(np.uint16))
+            x = np.where(over, x >> np.uint64(16), x)
+            state[: len(own)] = ((x // own) << np.uint64(SCALE_BITS)) + x % own + start[at]
+    states[:] = state
+    return np.concatenate(words[::-1])
 
 
 class Decoder:
@@ -129,20 +171,63 @@ class Decoder:
             count = len(rows)
             state = self.states[:count]
             slot = state & _SLOT_MASK
-            found = np.count_nonzero(rows[:, 1:] <= slot[:, None], axis=1)
+            found = (rows[:, 1:] <= slot[:, None]).argmin(1)
             at = found + _row_starts(count, width)
             flat = rows.ravel()
             start = flat[at]
-            state = (flat[at + 1] - start) * (state >> _SCALE_SHIFT) + slot - start
-            low = (state < _LOW).nonzero()[0]
-            stop = self.used + len(low)
-            if stop > len(self.words):
-                raise FormatError("entropy-coded stream ends too early")
-            state[low] = state[low] << _WORD_SHIFT | self.words[self.used : stop]
-            self.used = stop
-            self.states[:count] = state
+            self._advance(count, (flat[at + 1] - start) * (state >> _SCALE_SHIFT) + slot - start)
             out[i : i + self.lanes] = found
         return out
+
+    def lookup(self, table: NDArray[np.uint16], rows: NDArray[np.int64]) -> NDArray[np.int64]:
+        """The next N symbols, each by a row of `table` [rows, A + 1] of cumulative frequencies.
+
+        Raises:
+            FormatError: The stream ends too early.
+        """
+        width = table.shape[1]
+        flat = table.ravel()
+        out = np.empty(len(rows), np.int64)
+        for i in range(0, len(rows), self.lanes):
+            own = rows[i : i + self.lanes]
+            count = len(own)
+            state = self.states[:count]
+            slot = state & _SLOT_MASK
+            ends = table.take(own, 0)[:, 1:]
+            found = (ends <= slot.astype(np.uint16)[:, None]).argmin(1)
+            at = own * width + found
+            start = flat.take(at).astype(np.uint64)
+            freq = flat.take(at + 1).astype(np.uint64) - start
+            out[i : i + self.lanes] = found
+            self._advance(count, freq * (state >> _SCALE_SHIFT) + slot - start)
+        return out
+
+    def raw(self, widths: NDArray[np.int64]) -> NDArray[np.int64]:
+        """The next N numbers, of so many bits each, at most `SCALE_BITS`.
+
+        Raises:
+            FormatError: The stream ends too early.
+        """
+        out = np.empty(len(widths), np.int64)
+        for i in range(0, len(widths), self.lanes):
+            shift = np.uint64(SCALE_BITS) - widths[i : i + self.lanes].astype(np.uint64)
+            state = self.states[: len(shift)]
+            slot = state & _SLOT_MASK
+            found = slot >> shift
+            out[i : i + self.lanes] = found
+            fresh = ((state >> _SCALE_SHIFT) << shift) + slot - (found << shift)
+            self._advance(len(shift), fresh)
+        return out
+
+    def _advance(self, count: int, state: NDArray[np.uint64]) -> None:
+        """Puts new values into the first `count` states, and refills those that ran low."""
+        low = (state < _LOW).nonzero()[0]
+        stop = self.used + len(low)
+        if stop > len(self.words):
+            raise FormatError(TOO_SHORT)
+        state[low] = state[low] << _WORD_SHIFT | self.words[self.used : stop]
+        self.used = stop
+        self.states[:count] = state
 
     def finish(self) -> None:
         """Checks that the stream was used up exactly.

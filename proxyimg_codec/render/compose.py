@@ -15,7 +15,9 @@ from ..geometry.pose import COLOUR_BITS, OPACITY_MAX
 from ..geometry.warp import Located, Warp
 from ..limits import DEFAULT_LIMITS, Limits
 from ..texture import node
+from ..texture.implicit import ImplicitTexture
 from ..texture.network import Floats
+from ..texture.pyramid import PyramidTexture
 from . import cache, engines
 from .view import View
 
@@ -117,8 +119,8 @@ class _Painter:
         layer, pose = self._layer, self._layer.pose
         arrays = tuple(None if v is None else v.tobytes() for v in (pose.nodes, pose.places))
         return (
-            layer.boundary, layer.texture, self._image.networks[layer.texture.network],
-            layer.mesh, layer.box, layer.sampling, pose.matrix, pose.shift, arrays,
+            layer.boundary, layer.texture, layer.network, layer.mesh,
+            layer.box, layer.sampling, pose.matrix, pose.shift, arrays,
             self._view, box, self._engine,
         )  # fmt: skip
 
@@ -148,16 +150,19 @@ class _Painter:
         xs, ys = self._view.columns(x0, x0 + w), self._view.rows(y0, y0 + h)
         x, y = xs[at % w], ys[at // w]
         layer = self._layer
-        network = self._image.networks[layer.texture.network]
         face = None
         if self._warp.meshed:
             faces = self._warp.faces(*self._view.grid, box)
             face = faces.ravel()[at]
         shown = self._warp.locate(x, y, face)
+        texture = layer.texture
+        if isinstance(texture, PyramidTexture):
+            return premultiplied(texture.sample(shown.x, shown.y, layer.box))
         if layer.sampling:
-            return premultiplied(_at_nodes(self._image, layer, shown))
-        taps = layer.texture.taps(shown.x, shown.y, layer.box)
-        return premultiplied(self._run(layer.texture, network, taps))
+            return premultiplied(_at_nodes(self._image, layer, texture, shown))
+        network = self._image.networks[texture.network]
+        taps = texture.taps(shown.x, shown.y, layer.box)
+        return premultiplied(self._run(texture, network, taps))
 
 
 def outline(boundary: Boundary | None, view: View) -> list[NDArray[np.int64]] | None:
@@ -178,7 +183,7 @@ def outline(boundary: Boundary | None, view: View) -> list[NDArray[np.int64]] | 
     ]
 
 
-def _at_nodes(image: Image, layer: Layer, shown: Located) -> Floats:
+def _at_nodes(image: Image, layer: Layer, texture: ImplicitTexture, shown: Located) -> Floats:
     """Network outputs [n, channels] of a layer with node sampling."""
     size = (image.width, image.height)
     refined = layer.mesh.refined if layer.mesh else None
@@ -186,17 +191,17 @@ def _at_nodes(image: Image, layer: Layer, shown: Located) -> Floats:
     faces = np.zeros((1, 3), np.int32) if refined is None else refined.faces
     count = len(shown.x)
     features = node.features(
-        layer.texture, layer.box, layer.sampling, nodes, faces,
+        texture, layer.box, layer.sampling, nodes, faces,
         node.anchors(layer.boundary, size),
         np.zeros(count, np.int64) if shown.face is None else shown.face,
         np.zeros((count, 3)) if shown.weights is None else shown.weights,
         np.stack([shown.x, shown.y], axis=1),
     )  # fmt: skip
-    return engines.run_features(image.networks[layer.texture.network], features)
+    return engines.run_features(image.networks[texture.network], features)
 
 
 def premultiplied(output: Floats) -> Floats:
-    """Network outputs [N, 3 or 4] clamped to valid premultiplied colour and alpha [N, 4].
+    """Texture colours [N, 3 or 4] clamped to valid premultiplied colour and alpha [N, 4].
 
     Outputs that are not numbers count as 0. Colour is in 0..1; with a fourth output alpha is in
     0..1 and colour in 0..alpha.

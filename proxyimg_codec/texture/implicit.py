@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -78,6 +78,15 @@ class ImplicitTexture:
     steps: NDArray[np.float16]
     codes: NDArray[np.int8]
     stored: NDArray[np.bool_]
+
+    @property
+    def arrays(self) -> tuple[NDArray[Any], ...]:
+        """What it is made of."""
+        return self.codes, self.stored
+
+    def channels(self, networks: Sequence[Network]) -> int:
+        """Outputs of its network; `networks` are those of the file."""
+        return networks[self.network].shape.channels
 
     @property
     def grid(self) -> tuple[int, int]:

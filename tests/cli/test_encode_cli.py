@@ -80,9 +80,10 @@ def test_launcher_with_pipes_gives_the_same_bytes(launch, photo, encode):
 
 
 def test_same_seed_same_bytes_with_any_number_of_threads(encode):
-    first = encode("--seed", "3")
-    assert encode("--seed", "3", "-j", "2") == first
-    assert encode("--seed", "4") != first
+    implicit = ("--texture", "implicit", "--seed")
+    first = encode(*implicit, "3")
+    assert encode(*implicit, "3", "-j", "2") == first
+    assert encode(*implicit, "4") != first
     assert info(first)["settings"]["seed"] == 3
 
 
@@ -96,7 +97,7 @@ def test_quality_changes_size(encode):
     [(("--preset", "fast"), 2), (("--preset", "best", "-e", "1"), 1), (("--effort", "1"), 1)],
 )
 def test_effort_and_presets(tool, photo_png, tmp_path, flags, effort):
-    tool("encode", photo_png, tmp_path / "a.pxi", "-j", "1", *flags)
+    tool("encode", photo_png, tmp_path / "a.pxi", "-j", "1", "--texture", "implicit", *flags)
     assert info((tmp_path / "a.pxi").read_bytes())["settings"]["effort"] == effort
 
 
@@ -122,8 +123,12 @@ def test_boundary_method(encode, monkeypatch, tmp_path, photo):
         chamfer, "fit_paths_chamfer", lambda mask, step: slow(mask, step, iterations=10)
     )
     masks = save_masks(tmp_path / "masks", object=photo[..., 0] == 220)
-    facts = [info(encode("--masks", masks, "--boundary", b)) for b in ("lsq", "chamfer")]
-    assert [f["settings"]["boundary"] for f in facts] == ["lsq", "chamfer"]
+    facts = [
+        info(encode("--texture", "implicit", "--masks", masks, "--boundary", b))
+        for b in ("lsq", "chamfer")
+    ]
+    # What is usual is not recorded.
+    assert [f["settings"].get("boundary") for f in facts] == [None, "chamfer"]
     assert facts[0]["chunk_bytes"]["LAYR"] != facts[1]["chunk_bytes"]["LAYR"]
 
 
@@ -472,3 +477,24 @@ def test_what_is_not_installed_is_named(check_error, photo_png):
     assert ran.returncode == 5
     check_error("pxi-encode", ran.stderr.decode())
     assert b"cv2: pip install" in ran.stderr
+
+
+def test_coders(encode, tool, photo_png, tmp_path):
+    sizes = {}
+    for coder in ("pyramid", "implicit"):
+        facts = info(encode("--texture", coder, "--layers", "1"))
+        assert facts["layers"][0]["coder"] == coder
+        sizes[coder] = facts["bytes"]
+    assert encode("--layers", "1") == encode("--texture", "pyramid", "--layers", "1")
+    ran = tool("encode", photo_png, tmp_path / "said.pxi", *TINY, "--layers", "1")
+    assert "pyramid" in ran.err
+    assert sizes["pyramid"] < sizes["implicit"]
+
+
+def test_target_size(encode):
+    assert len(encode("--target-size", "1500", "--layers", "1")) == pytest.approx(1500, rel=0.02)
+
+
+def test_quality_and_target_contradict_each_other(tool, photo_png, tmp_path):
+    ran = tool("encode", photo_png, tmp_path / "a.pxi", "-q", "30", "--target-bpp", "1", code=2)
+    assert "contradict" in ran.err

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from proxyimg_codec.container.chunks import PREFIX, SIGNATURE, VERSION, Chunk, read, write
+from proxyimg_codec.container.chunks import PREFIX, READABLE, SIGNATURE, VERSION, Chunk, read, write
 from proxyimg_codec.errors import FormatError, LimitError, UnsupportedError
 from proxyimg_codec.limits import Limits
 
@@ -50,6 +50,8 @@ def test_every_flipped_bit_is_refused(position):
     for bit in range(8):
         damaged = bytearray(FILE)
         damaged[position] ^= 1 << bit
+        if tuple(damaged[8:10]) in READABLE and position == 9:
+            continue  # a file of another version
         with pytest.raises((FormatError, UnsupportedError)):
             read(bytes(damaged))
 
@@ -69,18 +71,22 @@ def test_bad_type_is_refused():
 def test_other_versions_are_unsupported_not_invalid():
     data = bytearray(FILE)
     data[8] = 1
-    with pytest.raises(UnsupportedError, match=r"1\.2"):
+    with pytest.raises(UnsupportedError, match=r"1\.3"):
         read(bytes(data))
 
 
-@pytest.mark.parametrize(("minor", "known"), [(0, False), (1, True), (2, True), (3, False)])
+@pytest.mark.parametrize(
+    ("minor", "known"), [(0, False), (1, True), (2, True), (3, True), (4, False)]
+)
 def test_known_versions_are_read(minor, known):
     data = bytearray(FILE)
     data[9] = minor
     if known:
         assert len(read(bytes(data))) == 3
         return
-    with pytest.raises(UnsupportedError, match=rf"0\.{minor}, this program reads 0\.1 and 0\.2"):
+    with pytest.raises(
+        UnsupportedError, match=rf"0\.{minor}, this program reads 0\.1, 0\.2, 0\.3;"
+    ):
         read(bytes(data))
 
 

@@ -106,8 +106,6 @@ def test_structure_is_checked(plain, change, message):
         ("layers", "box", [0, 0, 0, 5], FormatError),
         ("layers", "sampling", 3, None),
         ("layers", "sampling", 4, UnsupportedError),
-        ("textures", "coder", 2, UnsupportedError),
-        ("textures", "coder", 200, UnsupportedError),
         ("meshes", "layer", 1, FormatError),
         ("textures", "network", 1, FormatError),
         ("networks", "channels", 4, FormatError),

@@ -11,7 +11,7 @@ from proxyimg_codec.geometry.coverage import FULL, coverage
 from proxyimg_codec.quality import psnr, psnr_8bit
 from tests.conftest import disc, smooth
 
-FAST = {"effort": 2, "jobs": 1}
+FAST = {"texture": "implicit", "effort": 2, "jobs": 1}
 
 
 def test_what_is_returned_is_what_is_read(photo):
@@ -24,9 +24,9 @@ def test_what_is_returned_is_what_is_read(photo):
 
 
 def test_same_input_same_bytes_whatever_the_threads(photo):
-    a = pxi.encode(photo, effort=1, jobs=1).to_bytes()
-    assert pxi.encode(photo, effort=1, jobs=2).to_bytes() == a
-    assert pxi.encode(photo, effort=1, jobs=1, seed=1).to_bytes() != a
+    a = pxi.encode(photo, texture="implicit", effort=1, jobs=1).to_bytes()
+    assert pxi.encode(photo, texture="implicit", effort=1, jobs=2).to_bytes() == a
+    assert pxi.encode(photo, texture="implicit", effort=1, jobs=1, seed=1).to_bytes() != a
 
 
 def test_quality_is_monotonic():
@@ -41,7 +41,10 @@ def test_quality_is_monotonic():
 
 
 def test_effort_helps(photo):
-    values = [psnr(photo, pxi.encode(photo, effort=e, jobs=1, max_layers=1)) for e in (1, 4)]
+    values = [
+        psnr(photo, pxi.encode(photo, texture="implicit", effort=e, jobs=1, max_layers=1))
+        for e in (1, 4)
+    ]
     assert values[1] > values[0] + 1
 
 

@@ -22,18 +22,20 @@ def planned(settings, masks=True):
 
 
 def test_every_layer_has_a_mesh_but_a_lone_back():
-    assert all(layer.mesh is not None for layer in planned(Settings()).layers)
+    assert all(layer.mesh is not None for layer in planned(Settings(texture="implicit")).layers)
     assert [layer.mesh for layer in planned(Settings(mesh="none")).layers] == [None, None]
-    assert [layer.mesh for layer in planned(Settings(), masks=False).layers] == [None]
+    assert [layer.mesh for layer in planned(Settings(texture="implicit"), masks=False).layers] == [
+        None
+    ]
 
 
 def test_meshes_are_the_same_every_time():
-    one, two = (planned(Settings()).layers for _ in range(2))
+    one, two = (planned(Settings(texture="implicit")).layers for _ in range(2))
     assert [a.mesh.fields for a in one] == [b.mesh.fields for b in two]
 
 
 def test_a_mesh_holds_its_layer_with_room_to_spare():
-    for layer in planned(Settings()).layers:
+    for layer in planned(Settings(texture="implicit")).layers:
         faces = layer.mesh.refined
         corners = (faces.nodes / 1024)[faces.faces]
         held = rasterize(corners + 8, 0, 0, 112, 80) >= 0

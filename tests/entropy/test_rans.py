@@ -3,6 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from proxyimg_codec import kernel
 from proxyimg_codec.entropy.rans import LOW, SCALE_BITS, Decoder, Encoder
 from proxyimg_codec.errors import FormatError
 
@@ -91,3 +92,32 @@ def test_states_end_where_they_began():
     decoder = Decoder(code(symbols, cdf, 2))
     decoder.symbols(np.tile(cdf, (500, 1)))
     assert (decoder.states == LOW).all()
+
+
+@pytest.mark.skipif(not kernel.available(), reason="the kernel was not compiled")
+@given(
+    st.lists(st.integers(0, 70), max_size=8),
+    st.sampled_from([None, 0, 1, 3, 5]),
+    st.integers(0, 2**32 - 1),
+)
+def test_kernel_encodes_what_numpy_encodes(groups, lanes_log2, seed):
+    """Groups of any length, also empty ones, of the rarest to the most certain symbols."""
+    rng = np.random.default_rng(seed)
+    encoder = Encoder(lanes_log2)
+    for n in groups:
+        freq = np.minimum(1 << rng.integers(0, SCALE_BITS + 1, n), TOTAL)
+        encoder.put(rng.integers(0, TOTAL - freq + 1), freq)
+    fast = encoder.finish()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(kernel, "available", lambda: False)
+        assert encoder.finish() == fast
+
+
+def test_groups_may_be_put_at_once():
+    freq = np.random.default_rng(3).integers(1, 999, 50)
+    one, many = Encoder(2), Encoder(2)
+    for part in (freq[:7], freq[7:7], freq[7:50]):
+        one.put(part, part)
+    many.put_groups(*[freq.astype(np.uint16)] * 2, np.array([7, 7, 50]))
+    assert one.finish() == many.finish()
+    assert one.bits() == many.bits() == pytest.approx((SCALE_BITS - np.log2(freq)).sum())

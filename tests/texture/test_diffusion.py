@@ -3,7 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from proxyimg_codec.texture.diffusion import FRACTION_BITS, fill
+from proxyimg_codec.texture import diffusion
+from proxyimg_codec.texture.diffusion import FRACTION_BITS, diffused, fill
 
 ONE = 1 << FRACTION_BITS
 
@@ -51,3 +52,39 @@ def test_thin_planes(shape):
     stored = np.zeros(shape, bool)
     stored[0, 0] = True
     assert (fill(np.full((2, *shape), 3), stored) == 3 * ONE).all()
+
+
+def plainly(value, known):
+    """The same for one channel, as the specification says it, cell by cell."""
+    if known.all():
+        return value
+    h, w = known.shape
+    coarse = np.zeros(((h + 1) // 2, (w + 1) // 2), np.int64)
+    some = np.zeros(coarse.shape, bool)
+    for y, x in np.ndindex(coarse.shape):
+        children = value[2 * y : 2 * y + 2, 2 * x : 2 * x + 2]
+        seen = children[known[2 * y : 2 * y + 2, 2 * x : 2 * x + 2]]
+        if len(seen):
+            coarse[y, x] = np.floor(seen.sum() / len(seen) + 0.5)
+            some[y, x] = True
+    coarse = plainly(coarse, some)
+    out = np.array([[value[y, x] if known[y, x] else coarse[y // 2, x // 2] for x in range(w)]
+                    for y in range(h)])  # fmt: skip
+    for _ in range(8):
+        p = np.pad(out, 1, mode="edge")
+        mean = (p[:-2, 1:-1] + p[2:, 1:-1] + p[1:-1, :-2] + p[1:-1, 2:] + 2) >> 2
+        out = np.where(known, out, mean)
+    return out
+
+
+@pytest.mark.parametrize("tile", [3, 16, diffusion.TILE])
+def test_tiles_do_not_show(tile, monkeypatch):
+    monkeypatch.setattr(diffusion, "TILE", tile)
+    rng = np.random.default_rng(2)
+    value = rng.integers(-(1 << 24), 1 << 24, (2, 45, 150)).astype(np.int32)
+    known = np.ones((45, 150), bool)
+    known[5:40, 11:60], known[3, 149] = False, False
+    known[20:, 128:] = rng.random((25, 22)) < 0.2
+    out = diffused(value, known)
+    for channel, got in zip(value, out, strict=True):
+        np.testing.assert_array_equal(got, plainly(channel.astype(np.int64), known))

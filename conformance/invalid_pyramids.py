@@ -1,0 +1,313 @@
+"""Files that must be refused: faults of planes, of their streams, and of views."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import msgpack
+import numpy as np
+
+from proxyimg_codec.container.chunks import Chunk, write
+from proxyimg_codec.entropy import arrays
+from proxyimg_codec.image import Image
+from proxyimg_codec.texture import planes
+from proxyimg_codec.texture.planes import Latents
+
+from .builders import SIZE, Numbers, ellipse, layer, picture
+from .invalid import Base, Invalid, put, words
+from .pyramids import coded, view
+
+HEAD, BACK, DISC, PLAN, BACK_TEXR, DISC_TEXR, TAIL = range(7)
+"""Positions of the chunks in the base file."""
+
+COLOUR, ALPHA = 3, 4
+CLEAR_TEXR = (5, 6)
+"""Positions of planes and textures in the base file with alpha."""
+
+
+class Views(Base):
+    """A valid file: a back and a disc that show the same planes, which have a support."""
+
+    def build(self, n: Numbers) -> Image:
+        """The picture."""
+        cells = np.array([[1, 0, 1], [1, 1, 1], [0, 1, 1]], bool)
+        source = coded(n, SIZE, cells=cells, large=(90, -300))
+        mask = n.integers(0, 1, (6, 8)) > 0
+        return picture(
+            SIZE,
+            [
+                layer("back", (0, 0, *SIZE), view(source)),
+                layer("disc", (4, 3, 16, 12), view(source, part=(4, 3, 16, 12), cell=1, mask=mask),
+                      ellipse((12, 9), (7, 5.5))),
+            ],
+        )  # fmt: skip
+
+
+class Clear(Base):
+    """A valid file with alpha: two layers that show the same planes."""
+
+    def build(self, n: Numbers) -> Image:
+        """The picture."""
+        source, alpha = coded(n, (12, 10)), coded(n, (12, 10), components=1)
+        box = 0, 0, 12, 10
+        return picture(
+            (12, 10),
+            [
+                layer("back", box, view(source, alpha=alpha)),
+                layer("disc", box, view(source), ellipse((6, 5), (4, 4))),
+            ],
+            opaque=False,
+        )
+
+
+class Last(Base):
+    """A valid file whose last latent, and no other, escapes."""
+
+    def build(self, n: Numbers) -> Image:
+        """The picture."""
+        level, lowest = np.zeros((9, 1, 1), np.int32), np.zeros((3, 1, 1), np.int32)
+        level[8] = 65535
+        source = planes.encoded(Latents((level,), lowest), (2, 2), 256)
+        return picture((2, 2), [layer("back", (0, 0, 2, 2), view(source))])
+
+
+def _bits(values: Any) -> bytes:
+    """A coded array of 1 bit."""
+    array = np.array(values)
+    return arrays.encode(array[None], 1, np.ones(array.shape, bool))
+
+
+def _full(rows: int, columns: int, value: int) -> bytes:
+    return _bits(np.full((rows, columns), value))
+
+
+def _data(change: Callable[[bytes], bytes]) -> Callable[[Base], bytes]:
+    """Planes with another stream."""
+    return lambda b: b.edit(PLAN, "data", change)
+
+
+def _words(change: Callable[[bytes], bytes]) -> Callable[[Base], bytes]:
+    """Planes with other words in their stream."""
+    return _data(lambda v: words(v, change))
+
+
+def _escapes(change: Callable[[bytes], bytes]) -> Callable[[Base], bytes]:
+    return lambda b: b.edit(PLAN, "escapes", change)
+
+
+def _cuts(b: Base, cuts: list[int], **values: Any) -> bytes:
+    """The disc with cuts instead of a mask."""
+    return b.set(DISC_TEXR, **{"cell": 0, "mask": b"", "cuts": cuts} | values)
+
+
+def _back_cuts(b: Base, cuts: list[int]) -> bytes:
+    return b.set(BACK_TEXR, cuts=cuts)
+
+
+def _unused(b: Base) -> bytes:
+    return b.order(HEAD, BACK, DISC, PLAN, PLAN, BACK_TEXR, DISC_TEXR, TAIL)
+
+
+def _swapped(b: Base) -> bytes:
+    """The planes in the other order, which is not that of their first use."""
+    back, disc = CLEAR_TEXR
+    return write([
+        *b.chunks[:COLOUR], b.chunks[ALPHA], b.chunks[COLOUR],
+        _changed(b, back, planes=1, alpha=1), _changed(b, disc, planes=1), b.chunks[-1],
+    ])  # fmt: skip
+
+
+def _many(b: Base) -> bytes:
+    """Three layers that each show a raster of 2^26 samples with a mask."""
+    side = 1 << 13
+    texture = {"part": [0, 0, side, side], "cell": 6, "mask": _bits(np.eye(128, dtype=int))}
+    return write([
+        _changed(b, HEAD, layers=3, opaque=0),
+        *(_changed(b, DISC, name=name) for name in "abc"),
+        _changed(b, PLAN, size=[side, side], support=b""),
+        *[_changed(b, DISC_TEXR, **texture)] * 3,
+        b.chunks[TAIL],
+    ])  # fmt: skip
+
+
+def _carved(b: Base) -> bytes:
+    """A layer of 2^26 samples that 33 others cut."""
+    side, others = 1 << 13, range(1, 34)
+    box, part = [0, 0, side, side], {"part": [0, 0, side, side], "cuts": list(others)}
+    shared = replace(b.chunks[DISC_TEXR], payload=msgpack.packb({"coder": 0, "texture": 0}))
+    return write([
+        _changed(b, HEAD, layers=34),
+        _changed(b, BACK, box=box),
+        *(_changed(b, DISC, name=str(k)) for k in others),
+        _changed(b, PLAN, size=[side, side], support=b""),
+        _changed(b, BACK_TEXR, **part),
+        *[shared for _ in others],
+        b.chunks[TAIL],
+    ])  # fmt: skip
+
+
+def _large_mask(b: Base) -> bytes:
+    size = [1 << 13, 4097]
+    chunks = list(b.chunks)
+    chunks[PLAN] = _changed(b, PLAN, size=size)
+    chunks[DISC_TEXR] = _changed(b, DISC_TEXR, part=[0, 0, *size], cell=0)
+    return write(chunks)
+
+
+def _changed(b: Base, at: int, **values: Any) -> Chunk:
+    """Chunk `at` with other fields."""
+    return replace(b.chunks[at], payload=msgpack.packb(b.fields(at) | values))
+
+
+_Row = tuple[str, str, str, Callable[[Base], bytes]]
+
+# fmt: off
+_PLANES: list[_Row] = [
+    ("invalid-plan-order", "planes after the textures", "order",
+     lambda b: b.order(HEAD, BACK, DISC, BACK_TEXR, DISC_TEXR, PLAN, TAIL)),
+    ("invalid-plan-early", "planes before the layers", "order",
+     lambda b: b.order(HEAD, PLAN, BACK, DISC, BACK_TEXR, DISC_TEXR, TAIL)),
+    ("invalid-plan-missing", "textures of planes that do not exist", "references",
+     lambda b: b.order(HEAD, BACK, DISC, BACK_TEXR, DISC_TEXR, TAIL)),
+    ("invalid-plan-unused", "planes that no texture shows", "references", _unused),
+    ("invalid-plan-components", "two components", "pyramid: components",
+     lambda b: b.set(PLAN, components=2, lowest=[30, 30])),
+    ("invalid-plan-lowest", "a scale of the lowest planes too few", "pyramid: fields",
+     lambda b: b.set(PLAN, lowest=[30, 30])),
+    ("invalid-plan-shifts", "a shift too many", "pyramid: fields",
+     lambda b: b.set(PLAN, shifts=[8] * 5)),
+    ("invalid-plan-grey", "more levels without chroma than levels", "pyramid: grey levels",
+     lambda b: b.set(PLAN, grey=3)),
+    ("invalid-plan-chroma", "one component, and levels with chroma", "pyramid: grey levels",
+     lambda b: b.set(PLAN, components=1, lowest=[30])),
+    ("invalid-plan-size", "a raster without rows", "range", lambda b: b.set(PLAN, size=[24, 0])),
+    ("invalid-plan-levels", "no levels", "range", lambda b: b.set(PLAN, levels=0, shifts=[])),
+    ("invalid-plan-step", "a step of 2^10 and a bit", "range", lambda b: b.set(PLAN, step=641)),
+    ("invalid-plan-scale", "a scale of 64", "range", lambda b: b.set(PLAN, lowest=[64, 30, 30])),
+    ("invalid-plan-shift", "a shift of 8", "range", lambda b: b.set(PLAN, shifts=[8, 8, 8, 16])),
+    ("invalid-plan-cell", "cells of one sample", "range", lambda b: b.set(PLAN, cell=0)),
+    ("unsupported-model", "a model of the future", "registry", lambda b: b.set(PLAN, model=77)),
+    ("unsupported-model-0", "model 0", "registry", lambda b: b.set(PLAN, model=0)),
+    ("invalid-support-full", "a support that is everywhere", "pyramid: support",
+     lambda b: b.set(PLAN, support=_full(3, 3, 1))),
+    ("invalid-support-empty", "a support that is nowhere", "pyramid: support",
+     lambda b: b.set(PLAN, support=_full(3, 3, 0))),
+    ("invalid-support-cut", "a support of fewer cells", "pyramid: support",
+     lambda b: b.set(PLAN, support=_bits([[0, 1, 1]]))),
+    ("invalid-support-long", "a byte after the support", "pyramid: support",
+     lambda b: b.edit(PLAN, "support", lambda v: v + b"\0")),
+    ("invalid-support-other", "the support of other latents", "pyramid: support",
+     lambda b: b.set(PLAN, support=_bits([[1, 1, 1], [1, 1, 1], [1, 1, 0]]))),
+    ("limit-samples", "a raster of 2^27 samples", "limits",
+     lambda b: b.set(PLAN, size=[1 << 14, 1 << 13])),
+    ("limit-raster", "a raster of 16 million rows", "limits",
+     lambda b: b.set(PLAN, size=[1, 1 << 24])),
+    ("limit-mask", "a mask of 2^25 cells and some", "limits",
+     _large_mask),
+    ("limit-filled", "three layers of 2^26 samples that have to be filled", "limits", _many),
+    ("limit-covered", "a layer of 2^26 samples that 33 others cut", "limits", _carved),
+]
+
+_STREAMS: list[_Row] = [
+    ("invalid-latents-empty", "no bytes of latents", "pyramid: entropy",
+     lambda b: b.set(PLAN, data=b"")),
+    ("invalid-latents-lanes", "2,048 lanes", "pyramid: entropy", _data(lambda v: b"\x0b" + v[1:])),
+    ("invalid-latents-cut-head", "latents end in the states", "pyramid: entropy",
+     _data(lambda v: v[:4])),
+    ("invalid-latents-cut", "latents end in the words", "pyramid: entropy",
+     _data(lambda v: v[:len(v) // 2])),
+    ("invalid-latents-short-lowest", "the words end in the lowest planes", "pyramid: entropy",
+     _words(lambda w: w[:20])),
+    ("invalid-latents-short-middle", "the words end in the first level", "pyramid: entropy",
+     _words(lambda w: w[:len(w) // 4 * 2])),
+    ("invalid-latents-short", "a word too few", "pyramid: entropy", _words(lambda w: w[:-2])),
+    ("invalid-latents-long", "a word left over", "pyramid: entropy", _words(lambda w: w + b"\0\0")),
+    ("invalid-latents-end", "a byte after the latents", "pyramid: entropy",
+     _data(lambda v: v + b"\0")),
+    ("invalid-latents-state", "a bit of a state flipped", "pyramid: entropy",
+     _data(lambda v: put(v, 2, lambda x: x ^ 16))),
+    ("invalid-latents-low-state", "a state that is too low", "pyramid: entropy",
+     _data(lambda v: v[:3] + b"\0\0" + v[5:])),
+    ("invalid-latents-word", "a bit of the last word flipped", "pyramid: entropy",
+     _words(lambda w: put(w, -1, lambda x: x ^ 1))),
+    ("invalid-latents-step", "latents of another step", "pyramid: entropy",
+     lambda b: b.set(PLAN, step=0)),
+    ("invalid-escapes-none", "no escapes", "pyramid: escapes", lambda b: b.set(PLAN, escapes=b"")),
+    ("invalid-escapes-cut", "the escapes end early", "pyramid: escapes",
+     _escapes(lambda v: v[:-1])),
+    ("invalid-escapes-long", "an escape left over", "pyramid: escapes",
+     _escapes(lambda v: v + b"\x01")),
+    ("invalid-escapes-open", "the last escape goes on", "pyramid: escapes",
+     _escapes(lambda v: put(v, -1, lambda x: x | 128))),
+    ("invalid-escapes-five", "an escape of five bytes", "pyramid: escapes",
+     _escapes(lambda v: b"\x80\x80\x80\x80\x00" + v)),
+    ("invalid-latent-huge", "a latent of nearly 2^27", "pyramid: escapes",
+     _escapes(lambda v: b"\xfe\xff\xff\x7f" * len(v))),
+    ("invalid-latent-low", "a latent of -2^26", "pyramid: escapes",
+     _escapes(lambda v: b"\xff\xff\xff\x3f" * len(v))),
+]
+
+_VIEWS: list[_Row] = [
+    ("invalid-view-planes", "planes that do not exist", "references",
+     lambda b: b.set(DISC_TEXR, planes=1)),
+    ("invalid-view-alpha", "planes of alpha that do not exist", "references",
+     lambda b: b.set(DISC_TEXR, alpha=2)),
+    ("invalid-view-colour", "planes of alpha in colour", "pyramid: alpha",
+     lambda b: b.set(DISC_TEXR, alpha=1)),
+    ("invalid-part-empty", "a part without columns", "pyramid: part",
+     lambda b: b.set(DISC_TEXR, part=[4, 3, 0, 12])),
+    ("invalid-part-wide", "a part that leaves the raster to the right", "pyramid: part",
+     lambda b: b.set(DISC_TEXR, part=[9, 3, 16, 12])),
+    ("invalid-part-low", "a part that leaves the raster below", "pyramid: part",
+     lambda b: b.set(DISC_TEXR, part=[4, 7, 16, 12])),
+    ("invalid-part-items", "a part of three numbers", "fields",
+     lambda b: b.set(DISC_TEXR, part=[4, 7, 16])),
+    ("invalid-view-cell", "cells without a mask", "pyramid: mask",
+     lambda b: b.set(BACK_TEXR, cell=1)),
+    ("invalid-view-cell-size", "cells of 128 samples", "range", lambda b: b.set(DISC_TEXR, cell=7)),
+    ("invalid-view-full", "a mask of all samples", "pyramid: mask",
+     lambda b: b.set(DISC_TEXR, mask=_full(6, 8, 1))),
+    ("invalid-view-empty", "a mask of no sample", "pyramid: mask",
+     lambda b: b.set(DISC_TEXR, mask=_full(6, 8, 0))),
+    ("invalid-view-mask", "a mask of other cells", "pyramid: mask",
+     lambda b: b.set(DISC_TEXR, cell=2)),
+    ("invalid-view-mask-cut", "a mask that ends early", "pyramid: mask",
+     lambda b: b.edit(DISC_TEXR, "mask", lambda v: v[:-1])),
+    ("invalid-view-sampling", "a view at the nodes of a mesh", "sampling: node",
+     lambda b: b.set(DISC, sampling=3)),
+    ("invalid-view-keys", "a view with the coder of an implicit texture", "fields",
+     lambda b: b.set(DISC_TEXR, coder=1)),
+    ("invalid-cuts-mask", "a mask and cuts", "pyramid: cuts", lambda b: b.set(
+        DISC_TEXR, cuts=[1])),
+    ("invalid-cuts-size", "cuts of a part that is smaller than the box", "pyramid: cuts",
+     lambda b: _cuts(b, [1], part=[4, 3, 15, 12])),
+    ("invalid-cuts-behind", "cuts by a layer behind", "pyramid: cuts", lambda b: _cuts(b, [0])),
+    ("invalid-cuts-missing", "cuts by a layer that does not exist", "pyramid: cuts",
+     lambda b: _cuts(b, [1, 2])),
+    ("invalid-cuts-twice", "cuts by a layer twice", "pyramid: cuts", lambda b: _cuts(b, [1, 1])),
+    ("invalid-cuts-boundary", "cuts by a layer without boundary", "pyramid: cuts",
+     lambda b: _back_cuts(b, [0, 1])),
+]
+
+_CLEAR: list[_Row] = [
+    ("invalid-plan-use", "planes not in the order of their first use", "references", _swapped),
+    ("invalid-alpha-size", "planes of alpha of another size", "pyramid: alpha",
+     lambda b: b.set(ALPHA, size=[12, 11])),
+    ("invalid-alpha-channels", "planes of alpha in a picture of three channels", "channels",
+     lambda b: b.set(HEAD, channels=3)),
+    ("invalid-alpha-opaque", "opaque with a back layer whose view gives alpha", "opaque",
+     lambda b: b.set(HEAD, opaque=1)),
+]
+_LAST: list[_Row] = [
+    ("invalid-latent-high", "a latent above 2^16, after which nothing comes", "pyramid: escapes",
+     lambda b: b.set(2, escapes=b"\xc0\x80\x08")),
+]
+# fmt: on
+
+CASES = {
+    name: Invalid(title[0].upper() + title[1:], (tests,), build, base)
+    for base, rows in ((Views, (*_PLANES, *_STREAMS, *_VIEWS)), (Clear, _CLEAR), (Last, _LAST))
+    for name, title, tests, build in rows
+}

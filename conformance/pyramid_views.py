@@ -1,0 +1,181 @@
+"""Valid cases of views of planes: masks, cuts, fill, several layers; see `pyramids`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxyimg_codec.geometry.boundary import Boundary
+from proxyimg_codec.geometry.pose import REST, Pose
+from proxyimg_codec.image import Image, Layer, Layers
+from proxyimg_codec.texture.cuts import Cuts
+from proxyimg_codec.texture.implicit import Box
+from proxyimg_codec.texture.pyramid import PyramidTexture
+
+from .bent import CLOSE, TURN
+from .builders import (
+    SIZE,
+    Numbers,
+    Path,
+    bend,
+    disc,
+    ellipse,
+    grid_mesh,
+    layer,
+    network,
+    picture,
+    polygon,
+    texture,
+)  # fmt: skip
+from .pyramids import coded, view
+from .registry import WHOLE, Valids
+
+CASES = Valids()
+_case = CASES.case
+_Mask = NDArray[np.bool_]
+
+
+RING = ellipse((12, 9), (7, 5.5))
+"""The disc of `objects`."""
+
+
+def objects(
+    back: PyramidTexture, front: PyramidTexture, pose: Pose = REST, opaque: bool = True
+) -> Image:
+    """A disc over a back layer, each with a view, the disc posed."""
+    box = 4, 3, 16, 12
+    return picture(
+        SIZE,
+        [
+            layer("back", (0, 0, *SIZE), back),
+            layer("disc", box, front, RING, pose=pose),
+        ],
+        opaque=opaque,
+    )
+
+
+def _inside(box: Box) -> _Mask:
+    """Which pixels of a box have their centre in the disc."""
+    x, y, w, h = box
+    across, down = np.arange(w) + x + 0.5 - 12, np.arange(h)[:, None] + y + 0.5 - 9
+    return (across / 7) ** 2 + (down / 5.5) ** 2 < 1
+
+
+def _cells(inside: _Mask, cell: int) -> _Mask:
+    """Cells with any of these samples."""
+    side = 1 << cell
+    h, w = inside.shape
+    out = np.zeros((-(-h // side), -(-w // side)), bool)
+    i, j = np.nonzero(inside)
+    out[i // side, j // side] = True
+    return out
+
+
+@_case("Two layers show parts of the same planes, one of them moved: the fill shows",
+       "pyramid: mask", "pyramid: fill", renders=[WHOLE, CLOSE, {"background": False}])  # fmt: skip
+def _pyramid_moved(n: Numbers) -> Image:
+    source, box = coded(n, SIZE, levels=3), (4, 3, 16, 12)
+    back = view(source, cell=1, mask=_cells(~_inside((0, 0, *SIZE)), 1))
+    front = view(source, part=box, mask=_inside(box))
+    return objects(back, front, Pose(shift=(5 * 1024 + 301, -3 * 1024)))
+
+
+@_case("Masks of cells that the part cuts off, with alpha", "pyramid: mask", "pyramid: alpha",
+       renders=[WHOLE, CLOSE])  # fmt: skip
+def _pyramid_cells(n: Numbers) -> Image:
+    source, alpha = coded(n, SIZE), coded(n, SIZE, components=1)
+    part = (3, 2, 17, 13)
+    cells = n.integers(0, 1, (4, 5)) > 0
+    back = view(source, alpha=alpha, cell=3, mask=n.integers(0, 1, (3, 3)) > 0)
+    front = view(source, alpha=alpha, part=part, cell=2, mask=cells)
+    return objects(back, front, Pose(shift=(-2 * 1024, 700)), opaque=False)
+
+
+def _cut(n: Numbers, pose: Pose = REST) -> Image:
+    """As `objects`, with views that the boundary of the disc cuts."""
+    source, box = coded(n, SIZE, levels=3), (4, 3, 16, 12)
+    ring = Boundary(4, (RING,))
+    back = view(source, cuts=Cuts.of([1], 0, [None, ring], (0, 0, *SIZE)))
+    front = view(source, part=box, cuts=Cuts.of([1], 1, [None, ring], box))
+    made = objects(back, front, pose)
+    layers = list(made.layers)
+    layers[1] = replace(layers[1], boundary=ring)
+    return replace(made, layers=Layers(layers))
+
+
+@_case("Boundaries at rest tell which samples show", "pyramid: cuts",
+       "pyramid: fill", renders=[WHOLE, CLOSE, {"layers": ["back"]}])  # fmt: skip
+def _pyramid_cuts(n: Numbers) -> Image:
+    return _cut(n, Pose(shift=(6 * 1024, -3 * 1024 - 511)))
+
+
+@_case("Three layers of which two overlap, cut by each other", "pyramid: cuts",
+       renders=[{"layers": [name]} for name in ("back", "disc", "triangle")])  # fmt: skip
+def _pyramid_cuts_several(n: Numbers) -> Image:
+    source = coded(n, SIZE)
+    shapes = None, Boundary(4, (RING,)), Boundary(4, (polygon((22, 2), (20, 16), (9, 10)),))
+    boxes = (0, 0, *SIZE), (5, 3, 15, 12), (9, 2, 14, 15)
+    numbers = [1, 2], [1, 2], [2]
+    return picture(
+        SIZE,
+        [
+            Layer(
+                name, box, shape,
+                view(source, part=box, cuts=Cuts.of(numbers[k], k, shapes, box)),
+            )
+            for k, (name, box, shape) in enumerate(
+                zip(("back", "disc", "triangle"), boxes, shapes, strict=True)
+            )
+        ],
+    )  # fmt: skip
+
+
+@_case("Cuts that leave nothing: all samples show", "pyramid: cuts",
+       renders=[{"layers": ["back"]}])  # fmt: skip
+def _pyramid_cuts_all(n: Numbers) -> Image:
+    whole = Boundary(4, (polygon((-5, -5), (40, -5), (40, 40), (-5, 40)),))
+    size = 10, 8
+    cuts = Cuts.of([1], 0, [None, whole], (0, 0, *size))
+    source = coded(n, size)
+    back = layer("back", (0, 0, *size), view(source, cuts=cuts))
+    front = Layer("front", (0, 0, *size), whole, view(source, part=(0, 0, 5, 4)))
+    return picture(size, [back, front])
+
+
+@_case("A bent and turned layer", "pyramid: sampling", "pose: displacements",
+       renders=[WHOLE, CLOSE])  # fmt: skip
+def _pyramid_bent(n: Numbers) -> Image:
+    mesh = grid_mesh((2, 1), 5, 4)
+    source, box = coded(n, SIZE), (4, 3, 16, 12)
+    made = objects(view(source), view(source, part=box), Pose(nodes=bend(n, mesh), **TURN))
+    layers = list(made.layers)
+    layers[1] = replace(layers[1], mesh=mesh)
+    return replace(made, layers=Layers(layers))
+
+
+@_case("A layer that shows the view of another, in a box and with a mask and cuts of that",
+       "texture: shared", "pyramid: cuts")  # fmt: skip
+def _pyramid_shared(n: Numbers) -> Image:
+    made = _cut(n)
+    back, front = made.layers
+    shape: Path = polygon((1, 1), (11, 2), (9, 8), (2, 7))
+    copy = layer("copy", (0, 1, 12, 8), front.texture, shape)
+    other = layer("other", (13, 9, 11, 9), back.texture, polygon((13, 9), (23, 11), (15, 17)))
+    return replace(made, layers=Layers([back, front, copy, other]))
+
+
+@_case("Implicit and pyramid textures in one picture", "texture: coders", "networks: several")
+def _pyramid_mixed(n: Numbers) -> Image:
+    first, second = coded(n, (9, 8)), coded(n, (16, 12), levels=3)
+    return picture(
+        SIZE,
+        [
+            layer("back", (0, 0, *SIZE), texture(n)),
+            disc(n),
+            layer("shown", (2, 2, 9, 8), view(first), ellipse((6, 6), (4, 3.5))),
+            layer("large", (10, 5, 13, 12), view(second), polygon((11, 6), (22, 8), (14, 16))),
+        ],
+        network(n),
+    )

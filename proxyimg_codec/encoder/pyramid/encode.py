@@ -1,0 +1,324 @@
+"""From pixels to planes: analysis, refinement in windows, entropy coding."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from ...texture import planes as coded
+from ...texture.network import Floats
+from ...texture.planes import Latents, Planes
+from . import refine
+from .load import load
+from .model import LEVELS, LOG_SCALES, Model
+from .rate import around
+
+NUMBER = 1
+"""The registered model that is used."""
+
+CELL = 3
+"""Cells of the support have a side of 2**CELL samples."""
+
+WINDOW, MARGIN = 768, 64
+"""Side in samples of what is refined at a time, and what it sees beyond that: bounds memory."""
+
+REACH = 256
+"""Samples that the analysis of a window sees beyond it: its coarsest filters are that long."""
+
+SHIFTS = range(-8, 8)
+"""Shifts of the scale index that a file can hold."""
+
+SPARSE = 3
+"""They are found on every third latent, across and down."""
+
+
+class Effort(NamedTuple):
+    """How long to refine: steps with stochastic rounding, then rounds of moves by one."""
+
+    steps: int
+    rounds: int
+
+
+EFFORTS = (
+    Effort(0, 1), Effort(0, 2), Effort(0, 6), Effort(0, 15), Effort(0, 30), Effort(0, 60),
+    Effort(0, 120), Effort(50, 150), Effort(300, 200),
+)  # fmt: skip
+"""At effort 1..9."""
+
+
+class Raster(NamedTuple):
+    """What planes should show.
+
+    Attributes:
+        samples: float32 [H, W, 3] in 0..255; grey has three equal components.
+        weight: float32 [H, W] of the squared error, or None for 1 everywhere.
+        cells: bool cells of `CELL` that get latents, or None for all.
+        grey: Whether only one component is coded.
+        structural: Whether to aim at MS-SSIM instead of the squared error.
+    """
+
+    samples: Floats
+    weight: Floats | None = None
+    cells: NDArray[np.bool_] | None = None
+    grey: bool = False
+    structural: bool = False
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Columns and rows."""
+        return self.samples.shape[1], self.samples.shape[0]
+
+
+def levels_for(size: tuple[int, int]) -> int:
+    """Levels of the pyramid: the lowest plane keeps a few samples."""
+    return max(min(LEVELS, (max(size) - 1).bit_length() - 2), 1)
+
+
+def encode(
+    raster: Raster, step: int, effort: Effort, seed: int, tick: Callable[[int], None]
+) -> tuple[Planes, bool]:
+    """Planes that show a raster, and whether refinement ran to its end.
+
+    Args:
+        raster: What to show.
+        step: Quantization step, 2**(step / 64).
+        effort: How long to refine.
+        seed: Seed of the stochastic rounding.
+        tick: Called with the samples of a window after each step of its refinement. On
+            `KeyboardInterrupt`, here or in the refinement, what was found so far is kept.
+    """
+    model = load(NUMBER)
+    job = _Job(model, raster, step)
+    complete = True
+    random_state = torch.get_rng_state()
+    torch.manual_seed(seed)
+    try:
+        for window in job.windows():
+            job.refine(window, effort, seed, tick)
+    except KeyboardInterrupt:
+        complete = False
+    finally:
+        torch.set_rng_state(random_state)
+    return job.planes(), complete
+
+
+class _Job:
+    """Latents of one raster while they are refined."""
+
+    def __init__(self, model: Model, raster: Raster, step: int) -> None:
+        self.model, self.raster, self.step_index = model, raster, step
+        self.step = torch.tensor([2.0 ** (step / 64)])
+        self.count = levels_for(raster.size)
+        columns, rows = (-(-n >> self.count) << self.count for n in raster.size)
+        width, height = raster.size
+        edges = ((0, rows - height), (0, columns - width))
+        padded = np.pad(raster.samples, (*edges, (0, 0)), mode="symmetric")
+        self.picture = _tensor(padded.transpose(2, 0, 1))
+        weight = np.ones((height, width), np.float32) if raster.weight is None else raster.weight
+        even = raster.weight is None and padded.shape == raster.samples.shape
+        self.weight = None if even else _tensor(np.pad(weight, edges)[None])
+        self.support = self._support()
+        self.latents = self._analysed()
+        self.shifts = self._shifts()
+
+    def _support(self) -> list[Tensor] | None:
+        r = self.raster
+        padded = self.picture.shape[2:] != r.samples.shape[:2]
+        if r.cells is None and not r.grey and not padded:
+            return None
+        cells = np.ones(coded.cells_of(r.size, CELL), bool) if r.cells is None else r.cells
+        masks = []
+        for level in range(1, self.count + 1):
+            at = coded.support_at(cells, CELL, r.size, level, self.count)
+            mask = np.repeat(at[None], 9, 0)
+            mask[3:] &= not r.grey
+            masks.append(_tensor(mask.astype(np.float32)))
+        return masks
+
+    @torch.no_grad()
+    def _analysed(self) -> list[Tensor]:
+        """Latents from the analysis, in windows."""
+        unit = 1 << self.count
+        _, _, rows, columns = self.picture.shape
+        found = [
+            torch.zeros(1, 9, rows >> level, columns >> level) for level in range(1, self.count + 1)
+        ]
+        found.append(torch.zeros(1, 3, rows // unit, columns // unit))
+        for box in self.windows(REACH):
+            part = self.picture[:, :, box.outer[0], box.outer[1]]
+            own = refine.shrunk(self.model.analyse(part, self.step, self.count), refine.DEAD_ZONE)
+            for whole, new, level in zip(found, own, self._depths(), strict=True):
+                inner, offset = box.at(level, inner=True), box.inside(level)
+                whole[:, :, inner[0], inner[1]] = new[:, :, offset[0], offset[1]]
+        if self.raster.grey:
+            found[-1][:, 1:] = 0
+        if self.support is not None:
+            found[:-1] = [y * mask for y, mask in zip(found[:-1], self.support, strict=True)]
+        return found
+
+    def _depths(self) -> list[int]:
+        """Level of each array of latents; the lowest plane is as coarse as the last level."""
+        return [*range(1, self.count + 1), self.count]
+
+    def windows(self, reach: int = MARGIN) -> list[Window]:
+        """Windows that cover the raster, in reading order, and see `reach` samples beyond."""
+        unit = 1 << self.count
+        _, _, rows, columns = self.picture.shape
+        side = max(WINDOW // unit, 1) * unit
+        margin = -(-reach // unit) * unit
+        return [
+            Window.of((top, left), side, margin, (rows, columns))
+            for top in _starts(rows, side)
+            for left in _starts(columns, side)
+        ]
+
+    def refine(self, box: Window, effort: Effort, seed: int, tick: Callable[[int], None]) -> None:
+        """Refines the latents of a window; those of windows before it stay."""
+        outer = box.outer
+        depths = self._depths()
+        now = [
+            y[:, :, (a := box.at(level))[0], a[1]]
+            for y, level in zip(self.latents, depths, strict=True)
+        ]
+        free = None
+        if box.partial:
+            free = [box.mask(level).expand(1, y.shape[1], -1, -1) for y, level in
+                    zip(now, depths, strict=True)]  # fmt: skip
+        support = self.support and [
+            m[:, :, (a := box.at(level))[0], a[1]]
+            for m, level in zip(self.support, depths, strict=False)
+        ]
+        weight = None if self.weight is None else self.weight[:, :, outer[0], outer[1]]
+        target = refine.Target(
+            self.picture[:, :, outer[0], outer[1]], weight, support, free, self.step, self.shifts
+        )
+        if self.raster.structural:
+            # Moves by one rely on the curvature of the squared error.
+            target = refine.structural(self.model, target, now)
+            effort = Effort(effort.steps + effort.rounds, 0)
+        samples = box.samples
+
+        def done() -> None:
+            tick(samples)
+
+        best = now
+        try:
+            if effort.steps:
+                best = refine.refined(self.model, target, now, effort.steps, done)
+            if effort.rounds:
+                best = refine.improved(self.model, target, best, effort.rounds, seed, done)
+        finally:
+            # What lies around has suffered from the edges of the window.
+            for whole, new, level in zip(self.latents, best, depths, strict=True):
+                at, within = box.at(level, inner=True), box.inside(level)
+                whole[:, :, at[0], at[1]] = new[:, :, within[0], within[1]]
+
+    def planes(self) -> Planes:
+        """The coded planes of what was found."""
+        found = [torch.round(y) for y in self.latents]
+        whole = [y[0].numpy().astype(np.int32) for y in found]
+        r = self.raster
+        return coded.encoded(
+            Latents(tuple(whole[:-1]), whole[-1]), r.size, self.step_index, r.cells, CELL,
+            1 if r.grey else 3, NUMBER, self._shifts(),
+        )  # fmt: skip
+
+    @torch.no_grad()
+    def _shifts(self) -> tuple[int, ...]:
+        """The shifts of the scale index that take the fewest bits for the present latents."""
+        found = [torch.round(y) for y in self.latents]
+        spent = np.zeros((len(SHIFTS), self.count, 2))
+        for box in self.windows():
+            own = [
+                y[:, :, (a := box.at(level))[0], a[1]]
+                for y, level in zip(found, self._depths(), strict=True)
+            ]
+            likely = self.model.likelihoods(own, self.step)
+            few = slice(None, None, SPARSE)
+            for k, (y, p) in enumerate(zip(own, likely, strict=False)):
+                y, mean, scale = (v[:, :, few, few] for v in (y, *p))
+                mask = None
+                if self.support is not None:
+                    a = box.at(k + 1)
+                    mask = self.support[k][:, :, a[0], a[1]][:, :, few, few]
+                for n, shift in enumerate(SHIFTS):
+                    bits = around(y, mean, (scale + shift / 8).clamp(*LOG_SCALES)).here
+                    bits = bits if mask is None else bits * mask
+                    spent[n, k] += float(bits[:, :3].sum()), float(bits[:, 3:].sum())
+        spent += 1e-3 * np.abs(np.array(SHIFTS))[:, None, None]  # none, where nothing tells
+        return tuple(SHIFTS[i] for i in spent.argmin(0).ravel())
+
+
+class Window(NamedTuple):
+    """A window: slices of rows and columns of the raster, in samples.
+
+    Attributes:
+        inner: What it is responsible for.
+        outer: What it sees.
+        partial: Whether there are other windows.
+    """
+
+    inner: tuple[slice, slice]
+    outer: tuple[slice, slice]
+    partial: bool
+
+    @classmethod
+    def of(cls, corner: tuple[int, int], side: int, margin: int, shape: tuple[int, int]) -> Window:
+        """The window at a corner, of a raster of `shape`."""
+        inner = [slice(c, min(c + side, n)) for c, n in zip(corner, shape, strict=True)]
+        outer = [
+            slice(max(s.start - margin, 0), min(s.stop + margin, n))
+            for s, n in zip(inner, shape, strict=True)
+        ]
+        partial = any(s.stop - s.start < n for s, n in zip(inner, shape, strict=True))
+        return cls((inner[0], inner[1]), (outer[0], outer[1]), partial)
+
+    @property
+    def samples(self) -> int:
+        """Samples it is responsible for."""
+        rows, columns = self.inner
+        return int((rows.stop - rows.start) * (columns.stop - columns.start))
+
+    def at(self, level: int, inner: bool = False) -> tuple[slice, slice]:
+        """The window among the latents of a level."""
+        rows, columns = (
+            slice(s.start >> level, s.stop >> level) for s in (self.inner if inner else self.outer)
+        )
+        return rows, columns
+
+    def inside(self, level: int) -> tuple[slice, slice]:
+        """The inner window within the outer one, among latents of a level."""
+        rows, columns = (
+            slice((i.start - o.start) >> level, (i.stop - o.start) >> level)
+            for i, o in zip(self.inner, self.outer, strict=True)
+        )
+        return rows, columns
+
+    def mask(self, level: int) -> Tensor:
+        """[1, 1, h, w] of a level: what may change, which is what is not settled before it.
+
+        Settled are windows above, and those to the left in the same rows.
+        """
+        rows, columns = self.at(level)
+        i, j = self.inside(level)
+        out = torch.zeros(
+            (1, 1, rows.stop - rows.start, columns.stop - columns.start), dtype=torch.bool
+        )
+        out[:, :, i, j.start :] = True
+        out[:, :, i.stop :] = True
+        return out
+
+
+def _starts(length: int, side: int) -> list[int]:
+    return list(range(0, length, side))
+
+
+def _tensor(values: NDArray[np.floating]) -> Tensor:
+    """[1, C, H, W], channels last in memory."""
+    whole = torch.from_numpy(np.ascontiguousarray(values, np.float32))[None]
+    return whole.contiguous(memory_format=torch.channels_last)

@@ -1,0 +1,63 @@
+"""The registered model in torch, as the encoder needs it: exact weights, and the analysis."""
+
+from __future__ import annotations
+
+import functools
+from importlib import resources
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from ...texture import model as registry
+from .model import Model
+
+
+@functools.lru_cache(maxsize=2)
+def load(number: int) -> Model:
+    """The registered model, weights as in the decoder.
+
+    Activations are not rounded to whole numbers as the decoder's: for refinement that is no gain.
+
+    Raises:
+        UnsupportedError: There is no such model.
+    """
+    stored = registry.registered(number)
+    width = len(stored.context[0].mix.values)
+    model = Model(len(stored.synthesis[0].second.values), width)
+    state: dict[str, Tensor] = {"to_colour": _tensor(stored.to_colour)}
+    for k, (context, synthesis) in enumerate(zip(stored.context, stored.synthesis, strict=True)):
+        own = {"gain": _tensor(synthesis.gain), "gain_by_step": _tensor(synthesis.gain_by_step)}
+        own["synthesis_delta"] = _tensor(synthesis.delta)
+        for name in ("first", "second", "third"):
+            weights = _tensor(getattr(synthesis, name))
+            own[f"synthesis.{name}.weight"] = weights.reshape(*weights.shape[:2], *_sides(weights))
+            own[f"synthesis.{name}.bias"] = _tensor(getattr(synthesis, f"{name}_bias"))
+        own["synthesis.by_step"] = _tensor(synthesis.first_by_step)
+        for name in ("first", "second", "mix", "luma", "from_luma", "chroma"):
+            weights = _tensor(getattr(context, name))
+            own[f"{name}.weight"] = weights.reshape(*weights.shape[:2], *_sides(weights))
+            own[f"{name}.bias"] = _tensor(getattr(context, f"{name}_bias"))
+        own["first_by_step"] = _tensor(context.first_by_step) * 128
+        causal = torch.zeros(width, 18, 3, 5)
+        taps = _tensor(context.causal)
+        for i, (dy, dx) in enumerate(registry.CAUSAL):
+            causal[:, :, dy + 2, dx + 2] = taps[:, :, i]
+        own["causal"] = causal
+        state |= {f"levels.{k}.{name}": value for name, value in own.items()}
+    file = resources.files("proxyimg_codec.models").joinpath(f"pyramid-{number}-analysis.npz")
+    with file.open("rb") as stream, np.load(stream) as analysis:
+        state |= {k: torch.from_numpy(v.astype(np.float32)) for k, v in analysis.items()}
+    model.load_state_dict(state)
+    model.requires_grad_(False)
+    model.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+    return model
+
+
+def _tensor(array: registry.Array) -> Tensor:
+    return torch.from_numpy(array.floats.copy())
+
+
+def _sides(weights: Tensor) -> tuple[int, ...]:
+    """Kernel size of convolution weights; matrices are 1 x 1 kernels."""
+    return tuple(weights.shape[2:]) or (1, 1)

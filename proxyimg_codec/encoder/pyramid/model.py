@@ -1,0 +1,312 @@
+"""The pyramid model in torch: analysis, synthesis and context, as trained and as refined with."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from .wavelet import analysis_weights, extended, reflected, synthesis_weights
+
+LEVELS = 6
+SHARED_FROM = 4
+"""Levels from this one on use the same weights."""
+
+STEP = 1 / 32
+"""Step of the context network's 8-bit activations."""
+
+LOG_SCALES = (-4.0, 3.875)
+"""Range of the log scale, in steps of 1/8."""
+
+
+class Likelihood(NamedTuple):
+    """Distribution of the latents of one level: mean and log scale [B, 9, H, W]."""
+
+    mean: Tensor
+    log_scale: Tensor
+
+
+class _Through(torch.autograd.Function):
+    """Rounds to multiples of a step within bounds; the gradient passes inside the bounds."""
+
+    @staticmethod
+    def forward(ctx, x, step, low, high):  # type: ignore[no-untyped-def]
+        ctx.save_for_backward((x >= low * step) & (x <= high * step))
+        return (x * (1 / step)).round_().clamp_(low, high).mul_(step)
+
+    @staticmethod
+    def backward(ctx, grad):  # type: ignore[no-untyped-def]
+        (inside,) = ctx.saved_tensors
+        return grad * inside, None, None, None
+
+
+def through(x: Tensor, step: float, low: float, high: float) -> Tensor:
+    """`x` rounded to multiples of `step` from low * step to high * step, straight through."""
+    rounded: Tensor = _Through.apply(x, step, low, high)  # type: ignore[no-untyped-call]
+    return rounded
+
+
+def squash(x: Tensor) -> Tensor:
+    """X / (1 + |x| / 4): the signed feature of a difference or a latent, within -4..4."""
+    return x / (1 + x.abs() / 4)
+
+
+def soft(x: Tensor) -> Tensor:
+    """X / (1 + |x| / 8): input of the synthesis networks."""
+    return x / (1 + x.abs() / 8)
+
+
+def high_pass(x: Tensor) -> Tensor:
+    """X less the mean of its 3 x 3 neighbours, edges repeated."""
+    return x - F.avg_pool2d(F.pad(x, (1, 1, 1, 1), mode="replicate"), 3, 1)
+
+
+class Model(nn.Module):
+    """All weights; see `Level`.
+
+    Attributes:
+        integer: Whether the context network is simulated with 8-bit weights and activations.
+        fast: Whether convolutions of the networks run in bfloat16.
+    """
+
+    def __init__(self, hidden: int = 32, context: int = 32) -> None:
+        super().__init__()
+        self.levels = nn.ModuleList(Level(hidden, context) for _ in range(SHARED_FROM))
+        colour = torch.tensor([[1.0, 1, 1], [1, 0, -1], [1, -2, 1]])
+        colour /= colour.norm(dim=1, keepdim=True)
+        self.to_planes = nn.Parameter(colour.clone())
+        self.to_colour = nn.Parameter(colour.t().clone())
+
+    @property
+    def sizes(self) -> tuple[int, int]:
+        """Hidden units of the synthesis and of the context."""
+        level = self.level(1)
+        return level.synthesis.second.weight.shape[0], level.mix.weight.shape[0]
+
+    def level(self, number: int) -> Level:
+        """Weights of a level, 1 = finest."""
+        return self.levels[min(number, SHARED_FROM) - 1]  # type: ignore[return-value]
+
+    def set_mode(self, *, integer: bool | None = None, fast: bool | None = None) -> None:
+        """Sets `integer` or `fast` of every level."""
+        for level in self.levels:
+            level.integer = level.integer if integer is None else integer  # type: ignore
+            level.fast = level.fast if fast is None else fast  # type: ignore
+
+    def analyse(self, picture: Tensor, step: Tensor, levels: int = LEVELS) -> list[Tensor]:
+        """Latents of pictures [B, 3, H, W] in 0..255: levels 1.. [B, 9, h, w], and the lowest."""
+        scale = step.view(-1, 1, 1, 1)
+        q = log_step(step)
+        low = torch.einsum("ij,bjhw->bihw", self.to_planes, (picture - 128) / scale)
+        latents = []
+        for number in range(1, levels + 1):
+            level = self.level(number)
+            low, high = level.analyse(low, q)
+            latents.append(high / level.gains(q))
+        return [*latents, low]
+
+    def likelihoods(
+        self, latents: list[Tensor], step: Tensor, shifts: Sequence[int] | None = None
+    ) -> list[Likelihood]:
+        """Distributions of the latents of levels 1.., the lowest plane excepted.
+
+        Args:
+            latents: Latents of levels 1.., and the lowest plane.
+            step: Quantization steps [B].
+            shifts: Shift of the scale index per level: luma, chroma; None = 0.
+        """
+        q = log_step(step)
+        low = latents[-1]
+        parent = torch.zeros_like(low[:, :1, :1, :1]).expand(
+            low.shape[0], 9, low.shape[2] // 2 or 1, low.shape[3] // 2 or 1
+        )
+        found = []
+        for number in range(len(latents) - 1, 0, -1):
+            y = latents[number - 1]
+            likely = self.level(number).likelihood(low, parent, y, q)
+            if shifts is not None:
+                luma, chroma = shifts[2 * number - 2 : 2 * number]
+                by = torch.tensor([luma] * 3 + [chroma] * 6).view(1, 9, 1, 1) / 8
+                scale = (likely.log_scale + by).clamp(*LOG_SCALES)
+                likely = Likelihood(likely.mean, scale)
+            found.append(likely)
+            if number > 1:
+                low = plain_synthesis(low, y)
+            parent = y
+        return found[::-1]
+
+    def synthesise(self, latents: list[Tensor], step: Tensor) -> Tensor:
+        """Pictures [B, 3, H, W] in 0..255, neither rounded nor clipped."""
+        q = log_step(step)
+        low = latents[-1]
+        for number in range(len(latents) - 1, 0, -1):
+            level = self.level(number)
+            low = level.synthesise(low, latents[number - 1] * level.gains(q), q)
+        return torch.einsum("ij,bjhw->bihw", self.to_colour, low) * step.view(-1, 1, 1, 1) + 128
+
+
+def log_step(step: Tensor) -> Tensor:
+    """The networks' input for the quantization step: log2(step) / 2 - 293 / 128, [B, 1, 1, 1]."""
+    return (torch.log2(step) / 2 - 293 / 128).view(-1, 1, 1, 1)
+
+
+_PLAIN: dict[torch.dtype, Tensor] = {}
+
+
+def plain_synthesis(low: Tensor, high: Tensor) -> Tensor:
+    """The next finer plane by the plain CDF 9/7 wavelet, which conditions the context."""
+    weights = _PLAIN.setdefault(low.dtype, synthesis_weights().to(low.dtype))
+    return F.pixel_shuffle(F.conv2d(extended(low, high), weights), 2)
+
+
+class Level(nn.Module):
+    """Weights of one level.
+
+    Attributes:
+        synthesis_delta, analysis_delta: What was learned beyond the CDF 9/7 wavelet.
+        gain, gain_by_step: Log gain of each band, and its slope by `log_step`.
+    """
+
+    synthesis_base: Tensor
+    analysis_base: Tensor
+    mask: Tensor
+
+    def __init__(self, hidden: int, context: int) -> None:
+        super().__init__()
+        self.integer, self.fast = False, True
+        self.register_buffer("synthesis_base", synthesis_weights(), persistent=False)
+        self.register_buffer("analysis_base", analysis_weights(), persistent=False)
+        self.synthesis_delta = nn.Parameter(torch.zeros(12, 12, 5, 5))
+        self.analysis_delta = nn.Parameter(torch.zeros(12, 12, 5, 5))
+        self.gain = nn.Parameter(torch.zeros(9))
+        self.gain_by_step = nn.Parameter(torch.zeros(9))
+        self.synthesis = Residual(12, hidden, 12)
+        self.analysis = Residual(12, hidden, 12)
+        # Context
+        self.first = nn.Conv2d(12, context, 3)
+        self.first_by_step = nn.Parameter(torch.zeros(context))
+        self.second = nn.Conv2d(context, context, 3)
+        self.causal = nn.Parameter(torch.randn(context, 18, 3, 5) * 0.02)
+        mask = torch.ones(3, 5)
+        mask[2, 2:] = 0
+        self.register_buffer("mask", mask, persistent=False)
+        self.mix = nn.Conv2d(context, context, 1)
+        self.luma = nn.Conv2d(context, 6, 1)
+        self.from_luma = nn.Conv2d(6, context, 1)
+        self.chroma = nn.Conv2d(context, 12, 1)
+
+    def gains(self, q: Tensor) -> Tensor:
+        """Gains of the bands [B, 9, 1, 1]."""
+        return torch.exp(self.gain.view(1, 9, 1, 1) + self.gain_by_step.view(1, 9, 1, 1) * q)
+
+    def gains_at(self, step: Tensor) -> Tensor:
+        """Gains of the bands at quantization steps [B]: [B, 9, 1, 1]."""
+        return self.gains(log_step(step))
+
+    def analyse(self, low: Tensor, q: Tensor) -> tuple[Tensor, Tensor]:
+        """The next coarser plane and the bands [B, 9, h, w]."""
+        cells = F.pixel_unshuffle(low, 2)
+        weights = self.analysis_base + self.analysis_delta
+        linear = F.conv2d(F.pixel_unshuffle(reflected(low, 4), 2), weights)
+        parts = cells.view(cells.shape[0], 3, 4, *cells.shape[2:])
+        parts = (parts - parts.mean(2, keepdim=True)).flatten(1, 2)
+        out = linear + self.analysis(soft(parts), q, self.fast)
+        return out[:, :3], out[:, 3:]
+
+    def synthesise(self, low: Tensor, high: Tensor, q: Tensor) -> Tensor:
+        """The next finer plane [B, 3, 2h, 2w] of bands times gains."""
+        delta = eight_bit(self.synthesis_delta) if self.integer else self.synthesis_delta
+        linear = F.conv2d(extended(low, high), self.synthesis_base + delta)
+        inputs = torch.cat([soft(high_pass(low)), soft(high)], 1)
+        change = self.synthesis(inputs, q, self.fast, self.integer)
+        return F.pixel_shuffle(linear + change, 2)
+
+    def likelihood(self, low: Tensor, parent: Tensor, y: Tensor, q: Tensor) -> Likelihood:
+        """Distributions of latents y, given the plain plane `low` and the coarser level's y."""
+        up = F.interpolate(parent, size=y.shape[2:], mode="nearest")
+        inputs = torch.cat([squash(high_pass(low)), torch.log1p(up.abs())], 1)
+        z = self._conv(self.first, self._input(inputs), 1)
+        z = self._active(z + (self.first_by_step.view(1, -1, 1, 1) * q).to(z.dtype))
+        z = self._conv(self.second, z, 1)
+        seen = self._input(features(y))
+        past = self._conv2d(seen, self.causal * self.mask, None, (2, 2))[:, :, : y.shape[2]]
+        z = self._active(z + past)
+        z = self._active(self._conv(self.mix, z))
+        luma = self._conv(self.luma, z).float()
+        z = self._active(z + self._conv(self.from_luma, self._input(features(y[:, :3]))))
+        chroma = self._conv(self.chroma, z).float()
+        mean = torch.cat([luma[:, :3], chroma[:, :6]], 1)
+        log_scale = torch.cat([luma[:, 3:], chroma[:, 6:]], 1).clamp(*LOG_SCALES)
+        if self.integer:
+            mean = through(mean, 1 / 16, -(1 << 14), 1 << 14)
+            log_scale = through(log_scale, 1 / 8, -32, 31)
+        return Likelihood(mean, log_scale)
+
+    def _input(self, x: Tensor) -> Tensor:
+        return through(x, STEP, -127, 127) if self.integer else x
+
+    def _active(self, z: Tensor) -> Tensor:
+        if self.integer:
+            return through(z, STEP, 0, 255)
+        return z.clamp(0, 255 * STEP)
+
+    def _conv(self, layer: nn.Conv2d, x: Tensor, pad: int = 0) -> Tensor:
+        return self._conv2d(x, layer.weight, layer.bias, (pad, pad))
+
+    def _conv2d(self, x: Tensor, w: Tensor, b: Tensor | None, pad: tuple[int, int]) -> Tensor:
+        if self.integer:
+            w = through(w, weight_step(w), -127, 127)
+        return convolve(x, w, b, pad, self.fast)
+
+
+def weight_step(weights: Tensor) -> float:
+    """The power of two, 2 ** -12 .. 2 ** -3, that holds all weights in -127..127 steps."""
+    most = max(float(weights.detach().abs().max()), 1e-6)
+    return 2.0 ** min(max(math.ceil(math.log2(most / 127)), -12), -3)
+
+
+def eight_bit(weights: Tensor) -> Tensor:
+    """Weights in -127..127 units of the smallest power of two that holds them."""
+    most = max(float(weights.detach().abs().max()), 1e-6)
+    return through(weights, 2.0 ** math.ceil(math.log2(most / 127)), -127, 127)
+
+
+def features(y: Tensor) -> Tensor:
+    """The two features of latents that the context sees, [B, 2n, h, w]."""
+    return torch.cat([squash(y), torch.log1p(y.abs())], 1)
+
+
+def convolve(x: Tensor, w: Tensor, b: Tensor | None, pad: tuple[int, int], fast: bool) -> Tensor:
+    """Convolution, in bfloat16 where `fast`."""
+    if not fast:
+        return F.conv2d(x, w, b, padding=pad)
+    half = torch.bfloat16
+    return F.conv2d(x.to(half), w.to(half), None if b is None else b.to(half), padding=pad)
+
+
+class Residual(nn.Module):
+    """Three convolutions, 3 x 3, 1 x 1 and 3 x 3, with the step as a bias; starts as zero."""
+
+    def __init__(self, inputs: int, hidden: int, outputs: int) -> None:
+        super().__init__()
+        self.first = nn.Conv2d(inputs, hidden, 3)
+        self.by_step = nn.Parameter(torch.zeros(hidden))
+        self.second = nn.Conv2d(hidden, hidden, 1)
+        self.third = nn.Conv2d(hidden, outputs, 3)
+        nn.init.zeros_(self.third.weight)
+        nn.init.zeros_(self.third.bias)  # type: ignore[arg-type]
+
+    def forward(self, x: Tensor, q: Tensor, fast: bool, quantized: bool = False) -> Tensor:
+        """Outputs for inputs [B, C, h, w]; `quantized` simulates 8-bit weights."""
+        first, second, third = (
+            eight_bit(layer.weight) if quantized else layer.weight
+            for layer in (self.first, self.second, self.third)
+        )
+        z = convolve(x, first, self.first.bias, (1, 1), fast)
+        z = F.relu(z + (self.by_step.view(1, -1, 1, 1) * q).to(z.dtype))
+        z = F.relu(convolve(z, second, self.second.bias, (0, 0), fast))
+        return convolve(z, third, self.third.bias, (1, 1), fast).float()

@@ -1,0 +1,204 @@
+"""From a picture and planned layers to an `Image` whose layers are views of shared planes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import UsageError
+from ...geometry.boundary import Boundary
+from ...image import Image, Layer, Layers
+from ...quality import psnr
+from ...texture.cuts import Cuts
+from ...texture.network import Floats
+from ...texture.planes import Planes, cells_of
+from ...texture.pyramid import PyramidTexture
+from ..hidden import continued
+from ..layers import Plan
+from ..problem import coverage_of
+from ..settings import Settings
+from .encode import CELL, EFFORTS, Effort, Raster, encode
+
+Report = Callable[[str, int, int], None]
+Box = tuple[int, int, int, int]
+
+TOLERANCE = 0.015
+"""Relative deviation from a target size that is good enough; PSNR in units of 5 dB."""
+
+TRIES = 6
+FIRST_STEP, LAST_STEP = 0, 640
+
+
+@dataclass
+class Interrupts:
+    """Notes `KeyboardInterrupt`, after which refinement stops and searches end."""
+
+    seen: bool = False
+
+
+def encode_picture(picture: Floats, plan: Plan, settings: Settings, report: Report) -> Image:
+    """The 8-bit picture, without metadata, of planned layers.
+
+    Args:
+        picture: float32 [H, W, 4] with straight alpha, in 0..1.
+        plan: The layers.
+        settings: What is asked for.
+        report: As `Progress`.
+
+    Raises:
+        UsageError: A target cannot be reached.
+    """
+    height, width = picture.shape[:2]
+    shown = visible([coverage_of(v.boundary, width, height).reshape(height, width)
+                     for v in plan.layers])  # fmt: skip
+    views = [_view([v.boundary for v in plan.layers], k, seen) for k, seen in enumerate(shown)]
+    rasters = [colour_of(picture)._replace(structural=settings.tune == "ms-ssim")]
+    if plan.channels == 4:
+        rasters.append(alpha_of(picture[..., 3]))
+    interrupts = Interrupts()
+
+    def at(step: int, effort: Effort) -> Image:
+        sources = _coded(rasters, step, effort, settings, report, interrupts)
+        layers = [
+            Layer(v.name, box, v.boundary,
+                  PyramidTexture(sources[0], sources[1] if len(sources) > 1 else None, box,
+                                 cuts=cuts), v.mesh)
+            for v, (box, cuts) in zip(plan.layers, views, strict=True)
+        ]  # fmt: skip
+        return Image(width, height, plan.channels, plan.opaque, 8, Layers(layers), ())
+
+    effort = EFFORTS[settings.effort - 1]
+    if settings.target is None:
+        return at(settings.step, effort)
+    return _aimed(at, picture, settings, effort, interrupts)
+
+
+def _coded(
+    rasters: Sequence[Raster], step: int, effort: Effort, settings: Settings, report: Report,
+    interrupts: Interrupts,
+) -> list[Planes]:  # fmt: skip
+    """The planes of all rasters."""
+    work = len(rasters) * rasters[0].samples[..., 0].size * (effort.steps + effort.rounds)
+    done = 0
+
+    def tick(samples: int) -> None:
+        nonlocal done
+        done += samples
+        report("texture", done * settings.steps // work, settings.steps)
+
+    out = []
+    for raster in rasters:
+        planes, complete = encode(
+            raster, step, Effort(0, 0) if interrupts.seen else effort, settings.seed, tick
+        )
+        interrupts.seen |= not complete
+        out.append(planes)
+    return out
+
+
+def _aimed(
+    at: Callable[[int, Effort], Image], picture: Floats, settings: Settings, effort: Effort,
+    interrupts: Interrupts,
+) -> Image:  # fmt: skip
+    """The picture at a step that hits the target: found with little effort, then corrected."""
+    kind, wanted = settings.target or ("", 0.0)
+    pixels = picture.shape[0] * picture.shape[1]
+
+    def off(image: Image) -> float:
+        """Logarithm of the ratio to the target; positive if there are too many bits."""
+        if kind == "psnr":
+            found = psnr(picture if picture[..., 3].min() < 1 else picture[..., :3], image)
+            return (99.0 if found is None else found) / 5 - wanted / 5
+        size = len(image.to_bytes())
+        return math.log((8 * size / pixels if kind == "bpp" else size) / wanted)
+
+    step, slope = settings.step, -0.0095
+    for trial in (Effort(0, 1), effort):
+        seen: list[tuple[int, float]] = []
+        for _ in range(TRIES):
+            image = at(step, trial)
+            error = off(image)
+            seen.append((step, error))
+            if abs(error) <= TOLERANCE or interrupts.seen:
+                break
+            if len(seen) > 1 and seen[-2][0] != step:
+                measured = (error - seen[-2][1]) / (step - seen[-2][0])
+                slope = measured if -0.05 < measured < -0.001 else slope
+            moved = min(max(round(step - error / slope), FIRST_STEP), LAST_STEP)
+            if moved == step:
+                break
+            step = moved
+    if abs(error) > 2 * TOLERANCE and not interrupts.seen:
+        raise UsageError(f"target {kind} {wanted:g} is out of reach for this picture")
+    return image
+
+
+def visible(shares: Sequence[Floats]) -> list[Floats]:
+    """How much of each sample each layer shows, of coverages [H, W] back to front."""
+    clear = np.ones_like(shares[0])
+    out: list[Floats] = []
+    for covered in reversed(shares):
+        out.append(clear * covered)
+        clear = clear * (1 - covered)
+    return out[::-1]
+
+
+def _view(
+    boundaries: Sequence[Boundary | None], number: int, seen: Floats
+) -> tuple[Box, Cuts | None]:
+    """Box of a layer of which `seen` [H, W] shows, and what tells its samples of that."""
+    height, width = seen.shape
+    rows, columns = np.flatnonzero(seen.any(1)), np.flatnonzero(seen.any(0))
+    if boundaries[number] is None or not len(rows):  # the whole canvas, or wholly hidden
+        box = (0, 0, width, height)
+    else:
+        # Room for the kernel beyond the rim, so that its samples are filled, not clamped.
+        x0, y0 = max(int(columns[0]) - 2, 0), max(int(rows[0]) - 2, 0)
+        x1, y1 = min(int(columns[-1]) + 3, width), min(int(rows[-1]) + 3, height)
+        box = (x0, y0, x1 - x0, y1 - y0)
+    if len(boundaries) == 1:
+        return box, None
+    cuts = [
+        k for k, boundary in enumerate(boundaries)
+        if boundary is not None and (k == number or (k > number and _meets(boundary, box)))
+    ]  # fmt: skip
+    return box, Cuts.of(cuts, number, boundaries, box)
+
+
+def _meets(boundary: Boundary, box: Box) -> bool:
+    """Whether the bounds of a boundary and a box have a pixel in common."""
+    x0, y0, x1, y1 = boundary.bounds()
+    x, y, width, height = box
+    return x0 < x + width and x < x1 and y0 < y + height and y < y1
+
+
+def colour_of(picture: Floats) -> Raster:
+    """Straight colours [H, W, 4] as a raster: what is not seen continues what is."""
+    samples, alpha = picture[..., :3] * np.float32(255), picture[..., 3]
+    grey = bool((samples == samples[..., :1]).all())
+    if (alpha == 1).all():
+        return Raster(np.ascontiguousarray(samples), None, None, grey)
+    weight = alpha**2
+    samples = np.where(alpha[..., None] > 0, samples, continued(samples, alpha))
+    return Raster(samples.astype(np.float32), weight, _cells(alpha > 0), grey)
+
+
+def alpha_of(alpha: Floats) -> Raster:
+    """Alpha [H, W] as a grey raster."""
+    return Raster(np.repeat(alpha[..., None] * np.float32(255), 3, 2), None, None, True)
+
+
+def _cells(mask: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
+    """Cells of the support that hold a sample of `mask`."""
+    height, width = mask.shape
+    rows, columns = cells_of((width, height), CELL)
+    side = 1 << CELL
+    whole = np.pad(mask, ((0, rows * side - height), (0, columns * side - width)))
+    cells = np.asarray(whole.reshape(rows, side, columns, side).any((1, 3)))
+    if not cells.any():
+        cells[0, 0] = True
+    return None if cells.all() else cells

@@ -1,0 +1,45 @@
+"""MS-SSIM in torch, as what refinement may aim at."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+WEIGHTS = (0.0448, 0.2856, 0.3001, 0.2363, 0.1333)
+"""Exponents of the scales (Wang, Simoncelli, Bovik 2003, section 3.2)."""
+
+C1, C2 = (0.01 * 255) ** 2, (0.03 * 255) ** 2
+WINDOW, SIGMA = 11, 1.5
+
+
+def ms_ssim(a: Tensor, b: Tensor) -> Tensor:
+    """Multi-scale structural similarity [B] of pictures [B, C, H, W] in 0..255.
+
+    Pictures too small for all scales are judged by the first ones, with exponents that sum to 1.
+    """
+    x = torch.arange(WINDOW, dtype=a.dtype) - WINDOW // 2
+    window = torch.exp(-(x**2) / (2 * SIGMA**2))
+    window /= window.sum()
+    channels = a.shape[1]
+    scales = max(min(len(WEIGHTS), (min(a.shape[2:]) // WINDOW).bit_length()), 1)
+    total = sum(WEIGHTS[:scales])
+    out = torch.ones(a.shape[0], channels)
+    for scale in range(scales):
+        mean = _blur(torch.cat([a, b, a * a, b * b, a * b]), window).chunk(5)
+        ab, aa, bb = mean[0] * mean[1], mean[0] ** 2, mean[1] ** 2
+        part = (2 * (mean[4] - ab) + C2) / (mean[2] - aa + mean[3] - bb + C2)
+        if scale == scales - 1:
+            part = part * (2 * ab + C1) / (aa + bb + C1)
+        power = WEIGHTS[scale] / total
+        out = out * part.mean((2, 3)).clamp_min(1e-4) ** power
+        a, b = F.avg_pool2d(a, 2), F.avg_pool2d(b, 2)
+    return out.mean(1)
+
+
+def _blur(x: Tensor, window: Tensor) -> Tensor:
+    """Gaussian mean of each channel, where the window fits."""
+    channels = x.shape[1]
+    across = window.view(1, 1, 1, -1).expand(channels, 1, 1, -1)
+    down = window.view(1, 1, -1, 1).expand(channels, 1, -1, 1)
+    return F.conv2d(F.conv2d(x, across, groups=channels), down, groups=channels)

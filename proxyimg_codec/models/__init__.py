@@ -1,0 +1,1 @@
+"""Registered models: weights, and cards that say where they come from."""

@@ -1,0 +1,181 @@
+"""Levels of a pyramid in the compiled kernel (`_kernel_pyramid.h`); `context` is its judge."""
+
+from __future__ import annotations
+
+import ctypes as ct
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import kernel
+from ..entropy import laplace, rans
+from ..errors import FormatError
+from . import context
+from .context import Ints, LevelCoder
+
+WEIGHTS = (
+    "first", "first_bias", "second", "second_bias", "causal", "mix", "mix_bias", "luma",
+    "luma_bias", "from_luma", "from_luma_bias", "chroma", "chroma_bias",
+)  # fmt: skip
+BITS = {"first": 0, "second": 3, "causal": 3, "mix": 0, "luma": -1, "from_luma": 3, "chroma": -1}
+"""Layers, and the bits that their results keep beyond 1/32."""
+
+STREAM_ENDS, ESCAPES_END, OUT_OF_RANGE = 1, 2, 3
+
+
+class _Net(ct.Structure):
+    """Mirrors `struct ContextNet`."""
+
+    _fields_ = [
+        *((n, ct.c_void_p) for n in WEIGHTS),
+        *((f"{n}_bits", ct.c_int32) for n in BITS),
+        ("hidden", ct.c_int32),
+    ]
+
+
+class _Tables(ct.Structure):
+    """Mirrors `struct Tables`."""
+
+    _fields_ = [
+        *((n, ct.c_void_p) for n in ("ends", "reach", "shifts")),
+        *((n, ct.c_int32) for n in ("columns", "scales", "certain", "limit", "scale_bits")),
+    ]
+
+
+class _Source(ct.Structure):
+    """Mirrors `struct Source`."""
+
+    _fields_ = [
+        *((n, ct.c_void_p) for n in ("words", "states", "escapes")),
+        *((n, ct.c_int64) for n in ("n_words", "used", "n_escapes", "escapes_used")),
+        ("lanes", ct.c_int32),
+    ]
+
+
+class _Sink(ct.Structure):
+    """Mirrors `struct Sink`."""
+
+    _fields_ = [
+        *((n, ct.c_void_p) for n in ("start", "freq", "ends", "escapes")),
+        *((n, ct.c_int64) for n in ("n_symbols", "n_groups", "n_escapes")),
+    ]
+
+
+class _Level(ct.Structure):
+    """Mirrors `struct Level`."""
+
+    _fields_ = [
+        ("net", _Net),
+        ("tables", _Tables),
+        ("source", _Source),
+        ("sink", _Sink),
+        *((n, ct.c_int32) for n in ("height", "width", "grey")),
+        ("shifts", ct.c_int32 * 2),
+        ("logs", ct.c_void_p),
+        ("n_logs", ct.c_int64),
+        *((n, ct.c_void_p) for n in ("low", "parent", "support", "given", "latents")),
+    ]
+
+
+class Place(NamedTuple):
+    """Where a level is coded, and what is known before: see `LevelCoder.code`."""
+
+    coder: LevelCoder
+    low: Ints
+    parent: Ints
+    support: NDArray[np.bool_]
+
+
+def decode(at: Place, stream: rans.Decoder, escapes: bytes, used: int) -> tuple[Ints, int]:
+    """Decodes a level.
+
+    Args:
+        at: What is decoded.
+        stream: The entropy-coded stream; it moves on.
+        escapes: The list of escapes.
+        used: How many bytes of it were read before.
+
+    Returns:
+        The latents, int32 [9, h, w], and how many bytes of the escapes are read now.
+
+    Raises:
+        FormatError: As `planes` raises it.
+    """
+    words, states = stream.words.astype(np.uint16), stream.states.astype(np.uint32)
+    listed = np.frombuffer(escapes, np.uint8)
+    source = _Source(
+        kernel.pointer(words), kernel.pointer(states), kernel.pointer(listed),
+        len(words), stream.used, len(listed), used, stream.lanes,
+    )  # fmt: skip
+    level, latents = _run(at, None, source, _Sink())
+    stream.states[:] = states
+    stream.used = level.source.used
+    return latents, level.source.escapes_used
+
+
+def encode(at: Place, values: Ints, stream: rans.Encoder) -> tuple[Ints, NDArray[np.int64]]:
+    """Encodes a level.
+
+    Args:
+        at: What is encoded.
+        values: Latents [9, h, w].
+        stream: Where symbols are put.
+
+    Returns:
+        The latents as they are decoded, and the differences that escape, int64 [N].
+    """
+    h, w = at.support.shape
+    most = 9 * int(np.count_nonzero(at.support))
+    start, freq = np.empty(2 * most, np.uint16), np.empty(2 * most, np.uint16)
+    ends, escapes = np.empty(4 * (w + 3 * h), np.int64), np.empty(most, np.int64)
+    sink = _Sink(*(kernel.pointer(a) for a in (start, freq, ends, escapes)))
+    level, latents = _run(at, values, _Source(), sink)
+    groups, symbols = level.sink.n_groups, level.sink.n_symbols
+    stream.put_groups(start[:symbols].copy(), freq[:symbols].copy(), ends[:groups])
+    return latents, escapes[: level.sink.n_escapes].copy()
+
+
+def _run(at: Place, values: Ints | None, source: _Source, sink: _Sink) -> tuple[_Level, Ints]:
+    """Calls the kernel; the structure as it comes back, and the latents."""
+    lib = kernel.library()
+    assert lib is not None, "check available() first"
+    coder, weights = at.coder, at.coder.weights
+    h, w = at.support.shape
+    tables = laplace.tables()
+    alive: list[NDArray[Any]] = []
+
+    def address(array: NDArray[Any], dtype: type[np.generic]) -> int:
+        alive.append(np.ascontiguousarray(array, dtype))
+        return kernel.pointer(alive[-1])
+
+    parts = {n: getattr(weights, n).values for n in WEIGHTS} | {"first_bias": coder.first_bias}
+    latents = np.zeros((9, h, w), np.int32)
+    level = _Level(
+        _Net(
+            *(address(parts[n], np.int32) for n in WEIGHTS),
+            *(-getattr(weights, n).exponent - kept for n, kept in BITS.items()),
+            len(weights.mix.values),
+        ),
+        _Tables(
+            address(tables.ends, np.uint16),
+            address(tables.reach, np.int64),
+            address(laplace.SHIFTS, np.int64),
+            laplace.WIDTH + 1, laplace.SCALES, laplace.CERTAIN, context.LIMIT, rans.SCALE_BITS,
+        ),
+        source, sink, h, w, coder.grey, (ct.c_int32 * 2)(*coder.shifts),
+        address(context.LOG, np.int32), len(context.LOG),
+        address(at.low, np.int32), address(at.parent, np.int32), address(at.support, np.uint8),
+        None if values is None else address(values, np.int32),
+        kernel.pointer(latents),
+    )  # fmt: skip
+    wrong = lib.pxi_pyramid_level(ct.byref(level))
+    if wrong == STREAM_ENDS:
+        raise FormatError(rans.TOO_SHORT)
+    if wrong == ESCAPES_END:
+        raise FormatError(context.BAD_ESCAPES)
+    if wrong == OUT_OF_RANGE:
+        raise FormatError(context.BAD_LATENT)
+    if wrong:
+        raise MemoryError("not enough memory to code a pyramid")
+    return level, latents

@@ -1,0 +1,160 @@
+"""The registered pyramid models: weights that are part of the specification, not of a file.
+
+A model is one file of `models/`: a fixed sequence of arrays, each of whole numbers in units of a
+power of two (spec chapter 11). `Context` decides probabilities, in integers; `Synthesis` gives
+colour, in floating point.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import struct
+from importlib import resources
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import UnsupportedError
+from .network import Floats
+
+MAGIC = b"PXIMODL1"
+LEVEL_SETS = 4
+"""Weights of levels 1, 2, 3, and of all coarser ones."""
+
+REGISTERED = {1: "5e77e94c333fea4387caab28f7512a6dabac7b59eee41f137d1b4dfae98d75fd"}
+"""SHA-256 of the file of each model."""
+
+STEP_ORIGIN = 293
+"""Networks see the step as (step - STEP_ORIGIN) / 128."""
+
+CAUSAL = tuple((dy, dx) for dy in (-2, -1, 0) for dx in (-2, -1, 0, 1, 2) if dy < 0 or dx < 0)
+"""The neighbours, coded before, that the context of a latent sees."""
+
+
+class Array(NamedTuple):
+    """An array of a model: `values` in units of 2**exponent."""
+
+    values: NDArray[np.int32]
+    exponent: int
+
+    @property
+    def floats(self) -> Floats:
+        """The array as float32; exact."""
+        return (self.values * 2.0**self.exponent).astype(np.float32)
+
+
+class Context(NamedTuple):
+    """Context network of a level; C hidden units. Weights are [out, in, ...], biases [out].
+
+    Biases are in units of 1/32 of the unit of their weights; `first_by_step` besides in 1/256.
+    """
+
+    first: Array  # [C, 12, 3, 3]
+    first_bias: Array
+    first_by_step: Array
+    second: Array  # [C, C, 3, 3]
+    second_bias: Array
+    causal: Array  # [C, 18, 12]
+    mix: Array  # [C, C]
+    mix_bias: Array
+    luma: Array  # [6, C]
+    luma_bias: Array
+    from_luma: Array  # [C, 6]
+    from_luma_bias: Array
+    chroma: Array  # [12, C]
+    chroma_bias: Array
+
+
+class Synthesis(NamedTuple):
+    """Synthesis of a level; H hidden units."""
+
+    delta: Array  # [12, 12, 5, 5] what is added to the CDF 9/7 wavelet
+    gain: Array  # [9]
+    gain_by_step: Array  # [9]
+    first: Array  # [H, 12, 3, 3]
+    first_bias: Array
+    first_by_step: Array
+    second: Array  # [H, H]
+    second_bias: Array
+    third: Array  # [12, H, 3, 3]
+    third_bias: Array
+
+
+class Model(NamedTuple):
+    """All that a decoder needs; weights of level l are those at min(l, 4) - 1."""
+
+    to_colour: Array  # [3, 3]
+    context: tuple[Context, ...]
+    synthesis: tuple[Synthesis, ...]
+
+
+WIDE = ("bias", "by_step", "gain", "to_colour")
+"""Arrays whose names have these are int32 in the file; the others are int8."""
+
+
+def layout(hidden: int, context: int) -> list[tuple[str, tuple[int, ...], str]]:
+    """Names, shapes and types of all arrays in the order of the file."""
+    c, h = context, hidden
+    ctx = [
+        (c, 12, 3, 3), (c,), (c,), (c, c, 3, 3), (c,), (c, 18, 12), (c, c), (c,),
+        (6, c), (6,), (c, 6), (c,), (12, c), (12,),
+    ]  # fmt: skip
+    syn = [
+        (12, 12, 5, 5), (9,), (9,), (h, 12, 3, 3), (h,), (h,), (h, h), (h,), (12, h, 3, 3), (12,),
+    ]  # fmt: skip
+    names: list[tuple[str, tuple[int, ...]]] = [("to_colour", (3, 3))]
+    for level in range(LEVEL_SETS):
+        names += [(f"context {level} {n}", s) for n, s in zip(Context._fields, ctx, strict=True)]
+        names += [
+            (f"synthesis {level} {n}", s) for n, s in zip(Synthesis._fields, syn, strict=True)
+        ]
+    return [(n, s, "<i4" if any(w in n for w in WIDE) else "<i1") for n, s in names]
+
+
+def pack(arrays: dict[str, Array], hidden: int, context: int) -> bytes:
+    """The file of a model."""
+    out = [MAGIC, struct.pack("<HH", hidden, context)]
+    for name, shape, kind in layout(hidden, context):
+        values, exponent = arrays[name]
+        assert values.shape == shape, name
+        assert (values == values.astype(kind)).all(), name
+        out += [struct.pack("<b", exponent), values.astype(kind).tobytes()]
+    return b"".join(out)
+
+
+def unpack(data: bytes) -> Model:
+    """Inverse of `pack`."""
+    assert data[:8] == MAGIC
+    hidden, context = struct.unpack_from("<HH", data, 8)
+    at, arrays = 12, []
+    for _, shape, kind in layout(hidden, context):
+        count = int(np.prod(shape))
+        values = np.frombuffer(data, kind, count, at + 1).reshape(shape).astype(np.int32)
+        arrays.append(Array(values, struct.unpack_from("<b", data, at)[0]))
+        at += 1 + count * np.dtype(kind).itemsize
+    assert at == len(data)
+    contexts, syntheses = [], []
+    size = len(Context._fields) + len(Synthesis._fields)
+    for level in range(LEVEL_SETS):
+        own = arrays[1 + level * size : 1 + (level + 1) * size]
+        contexts.append(Context(*own[: len(Context._fields)]))
+        syntheses.append(Synthesis(*own[len(Context._fields) :]))
+    return Model(arrays[0], tuple(contexts), tuple(syntheses))
+
+
+@functools.cache
+def registered(number: int) -> Model:
+    """The model with a registered number.
+
+    Raises:
+        UnsupportedError: This program does not have it.
+    """
+    if number not in REGISTERED:
+        raise UnsupportedError(f"chunk PLAN: pyramid model {number} is not known; update "
+                               "proxyimg-codec")  # fmt: skip
+    data = resources.files("proxyimg_codec.models").joinpath(f"pyramid-{number}.bin").read_bytes()
+    if hashlib.sha256(data).hexdigest() != REGISTERED[number]:
+        raise UnsupportedError(f"the weights of pyramid model {number} are damaged; reinstall")
+    return unpack(data)

@@ -1,0 +1,249 @@
+"""The pyramid texture: a view of a part of decoded planes, sampled by an interpolating kernel.
+
+Several layers may show parts of the same planes: a mask, or boundaries that cut, tell the samples
+that each shows. Others are filled smoothly, when they are first asked for, from those that can be
+trusted: with a mask all that are shown, with cuts those that no other layer is mixed into.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..container import texr
+from ..entropy import arrays
+from ..errors import FormatError
+from ..geometry.boundary import Boundary
+from .cuts import Cuts, Samples
+from .diffusion import FRACTION_BITS, diffused
+from .implicit import Box, ImplicitTexture
+from .network import Floats, Network
+from .planes import Planes
+
+FILL_ONE = 255 << FRACTION_BITS
+"""The sample 1.0 as the fill counts it."""
+
+TAPS = 4
+"""Samples across and down that a point between samples is interpolated from."""
+
+CHUNK = 4096
+"""Points interpolated at a time, so that their samples stay in the cache."""
+
+
+@dataclass(frozen=True, eq=False)
+class PyramidTexture:
+    """A view of planes.
+
+    Attributes:
+        planes: The colours, straight if there is `alpha`; 1 component is grey.
+        alpha: Planes of the same size with the alpha, or None for opaque.
+        part: x, y, width, height in samples of what is shown, stretched over the layer's box.
+        cell: A cell of `mask` has a side of 2**cell samples.
+        mask: bool [rows, columns], cells from the corner of `part` whose samples are shown; None =
+            all, or what `cuts` leave.
+        cuts: What tells the samples, instead of a mask, or None.
+        network: None: none of the file.
+    """
+
+    planes: Planes
+    alpha: Planes | None
+    part: Box
+    cell: int = 0
+    mask: NDArray[np.bool_] | None = None
+    cuts: Cuts | None = None
+    network: ClassVar[None] = None
+
+    @property
+    def arrays(self) -> tuple[NDArray[Any], ...]:
+        """What it is made of beside planes."""
+        return () if self.mask is None else (self.mask,)
+
+    def channels(self, networks: Sequence[Network]) -> int:
+        """3, or 4 with alpha; `networks` are those of the file."""
+        return 3 if self.alpha is None else 4
+
+    @property
+    def sources(self) -> tuple[Planes, ...]:
+        """The planes it needs: colour, and alpha if there is any."""
+        return (self.planes,) if self.alpha is None else (self.planes, self.alpha)
+
+    @cached_property
+    def coded_mask(self) -> bytes:
+        """The mask as it was read, or coded anew; empty for all samples."""
+        if self.mask is None or self.mask.all():
+            return b""
+        return arrays.encode(self.mask[None].astype(np.int64), 1, np.ones(self.mask.shape, bool))
+
+    def masked(
+        self, own: Boundary | None = None, fronts: Collection[Boundary | None] = ()
+    ) -> PyramidTexture:
+        """This view with a mask instead of cuts: 2x2 samples that `Cuts.lasting` all keeps."""
+        if self.cuts is None:
+            return self
+        kept = self.cuts.lasting(own, fronts)
+        height, width = kept.shape
+        whole = np.pad(kept, ((0, height % 2), (0, width % 2)), mode="edge")
+        corners = [whole[j::2, i::2] for j in (0, 1) for i in (0, 1)]
+        mask = np.logical_and.reduce(corners)
+        if not mask.any():
+            mask = np.logical_or.reduce(corners)
+        if mask.all():
+            return replace(self, cuts=None)
+        return replace(self, cell=1, mask=mask, cuts=None)
+
+    def fields(self, numbers: Mapping[Planes, int], cuts: Sequence[int] = ()) -> dict[str, Any]:
+        """The fields of TEXR, where planes have `numbers`, and `cuts` are those of layers."""
+        mask = self.coded_mask
+        return {
+            "coder": texr.PYRAMID,
+            "planes": numbers[self.planes],
+            "alpha": 0 if self.alpha is None else 1 + numbers[self.alpha],
+            "part": list(self.part),
+            "cell": self.cell if mask else 0,
+            "mask": mask,
+            "cuts": list(cuts),
+        }
+
+    @cached_property
+    def shown(self) -> Samples | None:
+        """The samples of the part that are taken as they are, bool [height, width]; None = all."""
+        if self.mask is None:
+            shown = None if self.cuts is None else self.cuts.shown
+            return None if shown is None or shown.all() else shown
+        _, _, width, height = self.part
+        side = 1 << self.cell
+        return self.mask.repeat(side, 0)[:height].repeat(side, 1)[:, :width]
+
+    @cached_property
+    def filled(self) -> NDArray[np.uint16]:
+        """The part in 1/`FILL_ONE` [height * width, components, alpha last], from trusted samples.
+
+        Raises:
+            FormatError: The planes are corrupt.
+        """
+        trusted = self.shown if self.cuts is None else self.cuts.trusted
+        assert trusted is not None, "nothing is to be filled"
+        x, y, width, height = self.part
+        rasters = [p.raster[y : y + height, x : x + width] for p in self.sources]
+        values = np.concatenate([np.moveaxis(r, 2, 0) for r in rasters])
+        fixed = np.rint(values * np.float32(FILL_ONE)).astype(np.int32)
+        out = diffused(fixed, trusted).astype(np.uint16)
+        return np.ascontiguousarray(np.moveaxis(out, 0, 2)).reshape(-1, len(out))
+
+    def sample(self, x: NDArray[np.float64], y: NDArray[np.float64], box: Box) -> Floats:
+        """Colours [N, `channels`] at canvas points x, y [N], premultiplied, not clamped.
+
+        Points on samples take these as they are; others are interpolated by cubic convolution with
+        a = -1/2 (Keys 1981, "Cubic Convolution Interpolation for Digital Image Processing").
+
+        Args:
+            x: Canvas x of the points.
+            y: Canvas y.
+            box: The layer's rectangle.
+
+        Raises:
+            FormatError: The planes are corrupt.
+        """
+        column, fx = _position(x, box[0], box[2], self.part[2])
+        row, fy = _position(y, box[1], box[3], self.part[3])
+        if not (fx.any() or fy.any()):
+            return self._samples(row, column)
+        out = np.empty((len(x), self.channels(())), np.float32)
+        for i in range(0, len(x), CHUNK):
+            at = slice(i, i + CHUNK)
+            out[at] = self._interpolated(row[at], column[at], fy[at], fx[at])
+        return out
+
+    def _interpolated(
+        self, row: NDArray[np.intp], column: NDArray[np.intp], fy: Floats, fx: Floats
+    ) -> Floats:
+        """Colours of points at fractions fy, fx behind the samples of rows and columns."""
+        _, _, width, height = self.part
+        across, down = _weights(fx), _weights(fy)
+        total = np.zeros((len(row), self.channels(())), np.float32)
+        for j in range(TAPS):
+            below = np.clip(row + (j - 1), 0, height - 1)
+            for i in range(TAPS):
+                aside = np.clip(column + (i - 1), 0, width - 1)
+                total += (down[j] * across[i])[:, None] * self._samples(below, aside)
+        return total
+
+    def _samples(self, row: NDArray[np.intp], column: NDArray[np.intp]) -> Floats:
+        """Premultiplied samples [N, `channels`] of rows and columns of the part."""
+        x, y, width, _ = self.part
+        parts = []
+        for planes in self.sources:
+            at = (row + y) * planes.size[0] + (column + x)
+            parts.append(planes.raster.reshape(-1, planes.components).take(at, 0))
+        if self.shown is not None:
+            place = row * width + column
+            outside = np.flatnonzero(~self.shown.ravel().take(place))
+            if len(outside):
+                fill = self.filled.take(place[outside], 0) * np.float32(1 / FILL_ONE)
+                parts[0][outside] = fill[:, : self.planes.components]
+                if self.alpha is not None:
+                    parts[1][outside] = fill[:, -1:]
+        colour = parts[0] if self.planes.components == 3 else parts[0].repeat(3, 1)
+        if self.alpha is None:
+            return colour
+        return np.concatenate([colour * parts[1], parts[1]], axis=1)
+
+
+Texture = ImplicitTexture | PyramidTexture
+
+
+def _position(
+    points: NDArray[np.float64], start: int, extent: int, samples: int
+) -> tuple[NDArray[np.intp], Floats]:
+    """Samples before points on one axis, and fractions; the samples share the extent."""
+    at = (points - start) * (samples / extent)
+    at -= 0.5
+    np.clip(at, 0, samples - 1, out=at)
+    before = at.astype(np.intp)
+    at -= before
+    return before, at.astype(np.float32)
+
+
+def _weights(f: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Weights of the samples before, at, after and after that for fractions f [N]; their sum is 1.
+
+    At f = 0 they are exactly 0, 1, 0, 0.
+    """
+    half = np.float32(0.5)
+    return (
+        ((2 - f) * f - 1) * f * half,
+        ((3 * f - 5) * f * f + 2) * half,
+        ((4 - 3 * f) * f + 1) * f * half,
+        (f - 1) * f * f * half,
+    )
+
+
+def unpack(
+    fields: Mapping[str, Any],
+    planes: Sequence[Planes],
+    where: str = "chunk TEXR",
+    cuts: Cuts | None = None,
+) -> PyramidTexture:
+    """Inverse of `PyramidTexture.fields`; `planes` are those of the file.
+
+    Raises:
+        FormatError: The mask is corrupt, full or empty.
+    """
+    x, y, width, height = fields["part"]
+    mask = None
+    if fields["mask"]:
+        shape = texr.mask_shape(fields)
+        mask = arrays.decode(fields["mask"], (1, *shape), 1, np.ones(shape, bool))[0].astype(bool)
+        if mask.all() or not mask.any():
+            raise FormatError("the mask of the view is full or empty", where)
+    alpha = planes[fields["alpha"] - 1] if fields["alpha"] else None
+    texture = PyramidTexture(
+        planes[fields["planes"]], alpha, (x, y, width, height), fields["cell"], mask, cuts
+    )
+    texture.__dict__["coded_mask"] = fields["mask"]
+    return texture

@@ -1,0 +1,149 @@
+"""The synthesis of the pyramid coder: latents to samples, in floating point."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import kernel
+from . import synthesis_native
+from .context import Ints
+from .convolution import by_row, convolved, strips
+from .model import STEP_ORIGIN, Model, Synthesis
+from .network import Floats
+
+# Antonini et al. 1992, table II, orthonormal: half of the synthesis filters of the CDF 9/7 wavelet.
+_LOW = (0.788485616406, 0.418092273222, -0.040689417609, -0.064538882629)
+_HIGH = (0.852698679009, -0.377402855613, -0.110624404418, 0.023849465020, 0.037828455507)
+
+BANDS = ((0, 1), (1, 0), (1, 1))
+"""(vertical, horizontal), 1 = high pass, of the three latents that a colour has at a place."""
+
+
+@functools.cache
+def wavelet() -> NDArray[np.float64]:
+    """Synthesis weights [12 cells, 12 planes, 5, 5] of the CDF 9/7 wavelet.
+
+    Cell 4 * colour + 2 * y + x is a sample of the 2 x 2 that a place gives. Plane c is the low band
+    of colour c, plane 3 + 3 * band + colour a high one.
+    """
+    axis = np.zeros((2, 2, 5))  # [band, phase, tap]
+    for phase in range(2):
+        for tap in range(5):
+            n = phase - 2 * (tap - 2)
+            axis[0, phase, tap] = _LOW[abs(n)] if abs(n) < 4 else 0
+            axis[1, phase, tap] = _HIGH[abs(n - 1)] if abs(n - 1) < 5 else 0
+    out = np.zeros((12, 12, 5, 5))
+    for colour in range(3):
+        for y in range(2):
+            for x in range(2):
+                cell = 4 * colour + 2 * y + x
+                for plane, (v, h) in ((colour, (0, 0)), *_planes(colour)):
+                    out[cell, plane] = np.outer(axis[v, y], axis[h, x])
+    return out
+
+
+def _planes(colour: int) -> list[tuple[int, tuple[int, int]]]:
+    return [(3 + 3 * band + colour, way) for band, way in enumerate(BANDS)]
+
+
+def samples(model: Model, latents: Sequence[Ints], lowest: Ints, step: int) -> Floats:
+    """Samples [H, W, 3] in 0..255, not clipped, of latents 1.. [9, h, w] and the lowest plane."""
+    out = np.ascontiguousarray(lowest.transpose(1, 2, 0), np.float32)
+    for number in range(len(latents), 0, -1):
+        weights = model.synthesis[min(number, len(model.synthesis)) - 1]
+        out = _finer(weights, out, latents[number - 1], step)
+    colours = model.to_colour.floats * np.float32(2 ** (step / 64))
+    for top, bottom in strips(*out.shape[:2]):
+        out[top:bottom] = out[top:bottom] @ colours.T + 128
+    return out
+
+
+def _finer(weights: Synthesis, low: Floats, latents: Ints, step: int) -> Floats:
+    """The next finer planes [2h, 2w, 3]."""
+    t = np.float32((step - STEP_ORIGIN) / 128)
+    gain = np.exp(weights.gain.floats + weights.gain_by_step.floats * t)
+    bias = weights.first_bias.floats + weights.first_by_step.floats * t
+    linear = (wavelet() + weights.delta.floats).astype(np.float32)
+    if kernel.available():
+        return synthesis_native.finer(weights, linear, gain, bias, low, latents)
+    return _filtered(weights, linear, gain, bias, low, latents)
+
+
+def _filtered(
+    weights: Synthesis, linear: Floats, gain: Floats, bias: Floats, low: Floats, latents: Ints
+) -> Floats:
+    """As `synthesis_native.finer`, in numpy."""
+    h, w = low.shape[:2]
+    # A place gives 2 rows of 2 samples of 3 colours.
+    order = np.arange(12).reshape(3, 2, 2).transpose(1, 2, 0).ravel()
+    wavelets, first = by_row(linear[order]), by_row(weights.first.floats)
+    third, third_bias = by_row(weights.third.floats[order]), weights.third_bias.floats[order]
+    out = np.empty((h, 2, w, 6), np.float32)
+    for top, bottom in strips(h, w):
+        start, end = max(top - 2, 0), min(bottom + 2, h)
+        high = latents[:, start:end].transpose(1, 2, 0) * gain
+        inputs = np.concatenate([_soft(_high_pass(low, start, end)), _soft(high)], 2)
+        z = convolved(inputs, first, top - 1 - start, bottom + 1 - start)
+        z += bias
+        np.maximum(z, 0, out=z)
+        z = z @ weights.second.floats.T
+        z += weights.second_bias.floats
+        np.maximum(z, 0, out=z)
+        z = z.reshape(-1, w, z.shape[1])
+        if top == 0:
+            z[0] = 0  # rows outside are 0, not what their bias would give
+        if bottom == h:
+            z[-1] = 0
+        z = convolved(z, third, 1, 1 + bottom - top)
+        z += third_bias
+        wide = _extended(low, latents, gain, top, bottom)
+        straight = convolved(wide, wavelets, 2, 2 + bottom - top).reshape(-1, w + 4, 12)
+        z = z.reshape(-1, w, 12) + straight[:, 2:-2]
+        out[top:bottom] = z.reshape(-1, w, 2, 6).swapaxes(1, 2)
+    return out.reshape(2 * h, 2 * w, 3)
+
+
+def _soft(x: Floats) -> Floats:
+    return np.divide(x, 1 + np.abs(x) / np.float32(8), dtype=np.float32)
+
+
+def _high_pass(x: Floats, start: int, end: int) -> Floats:
+    """Rows of x [h, w, 3] less the mean of their 3 x 3 neighbours, edges repeated."""
+    near = x.take(np.arange(start - 1, end + 1), 0, mode="clip")
+    p = np.pad(near, ((0, 0), (1, 1), (0, 0)), mode="edge")
+    rows = p[:, :-2] + p[:, 1:-1] + p[:, 2:]
+    around: Floats = (rows[:-2] + rows[1:-1] + rows[2:]) / np.float32(9)
+    return x[start:end] - around
+
+
+def _extended(low: Floats, latents: Ints, gain: Floats, top: int, bottom: int) -> Floats:
+    """Rows top - 2 .. bottom + 1 of planes [rows, w + 4, 12], mirrored as the wavelet needs it.
+
+    Low bands come first, then high bands.
+    """
+    out = np.empty((bottom - top + 4, low.shape[1] + 4, 12), np.float32)
+    out[..., :3] = _mirrored(low, False, False, top, bottom)
+    for band, (v, h) in enumerate(BANDS):
+        part = _mirrored(latents[band::3].transpose(1, 2, 0), bool(v), bool(h), top, bottom)
+        out[..., 3 + 3 * band : 6 + 3 * band] = part * gain[band::3]
+    return out
+
+
+def _mirrored(
+    planes: NDArray[Any], vertical: bool, horizontal: bool, top: int, bottom: int
+) -> NDArray[Any]:
+    rows = _indices(planes.shape[0], vertical)[top : bottom + 4]
+    return planes[rows[:, None], _indices(planes.shape[1], horizontal)]
+
+
+def _indices(n: int, high: bool) -> NDArray[np.int64]:
+    """-2..n+1 mirrored: low bands about the first sample and behind the last, high reversed."""
+    index = np.arange(-2, n + 2)
+    index = np.where(index < 0, -index - int(high), index)
+    index = np.where(index >= n, 2 * n - 1 - int(high) - index, index)
+    return np.clip(index, 0, n - 1)

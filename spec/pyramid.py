@@ -1,0 +1,143 @@
+"""The generated parts of chapter 11: the registered models, tables, a worked example."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from importlib import resources
+from unittest import mock
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxyimg_codec import kernel
+from proxyimg_codec.entropy import laplace
+from proxyimg_codec.texture import model, planes
+from proxyimg_codec.texture.planes import Latents
+
+from .dump import grid
+
+Ints = NDArray[np.int64]
+
+_LOW = np.array([[[-9, 4, 60], [2, 3, -1]], [[3, 1, 0], [0, 2, 0]], [[-2, 0, 0], [0, 0, 1]]])
+_HIGH = {0: [[3, 0, -1], [0, 2, 0]], 1: [[0, -70, 0], [0, 0, 1]], 4: [[0, 0, 1], [0, 0, 0]]}
+"""Latents of the worked example: the lowest planes, and channels of level 1."""
+
+
+def scales() -> Iterator[str]:
+    """Lines of Python with the constants of the distributions."""
+    last = laplace.DIRECT + 1
+    yield from _listed("DECAY", [laplace.decay(k) for k in range(last + laplace._HEAVIER)])
+    yield from _listed("REACHES", [laplace.reach_of(k) for k in range(last)])
+
+
+def _listed(name: str, values: list[int], a_line: int = 8) -> Iterator[str]:
+    yield f"{name} = ["
+    for at in range(0, len(values), a_line):
+        yield "    " + " ".join(f"{v}," for v in values[at : at + a_line])
+    yield "]  # fmt: skip"
+
+
+def _file(number: int) -> bytes:
+    return resources.files("proxyimg_codec.models").joinpath(f"pyramid-{number}.bin").read_bytes()
+
+
+def models() -> Iterator[str]:
+    """Rows of the table of registered models."""
+    yield "| Number | File | Bytes | H | C |"
+    yield "|---|---|---|---|---|"
+    for number in model.REGISTERED:
+        data = _file(number)
+        hidden, context = struct.unpack_from("<HH", data, len(model.MAGIC))
+        yield f"| {number} | `pyramid-{number}.bin` | {len(data)} | {hidden} | {context} |"
+
+
+def registered() -> Iterator[str]:
+    """Lines of Python with the SHA-256 of each model."""
+    yield "REGISTERED = {"
+    for number, digest in model.REGISTERED.items():
+        yield f'    {number}: "{digest}",'
+    yield "}"
+
+
+def layout() -> Iterator[str]:
+    """Rows of the table of arrays in a model file, with the exponents of the newest model."""
+    number = max(model.REGISTERED)
+    found = model.registered(number)
+    h, c = 10007, 10009  # stand for any widths
+    letters = {h: "H", c: "C"}
+    head = ", ".join(str(k) for k in range(1, model.LEVEL_SETS))
+    yield f"| Array | Type | Shape | e in model {number}: levels {head}, and above |"
+    yield "|---|---|---|---|"
+    for name, shape, kind in model.layout(h, c):
+        part, level, array = ["", "0", name] if " " not in name else name.split()
+        if level != "0":
+            continue
+        exponents = [found.to_colour.exponent]
+        if part:
+            exponents = [getattr(v, array).exponent for v in getattr(found, part)]
+        sizes = ", ".join(letters.get(n, str(n)) for n in shape)
+        type_ = {"<i4": "int32", "<i1": "int8"}[kind]
+        units = ", ".join(map(str, exponents))
+        yield f"| {f'{part} `{array}`'.strip()} | {type_} | [{sizes}] | {units} |"
+
+
+def _example() -> planes.Planes:
+    """The planes of the worked example."""
+    level = np.zeros((9, 2, 3), np.int32)
+    for channel, values in _HIGH.items():
+        level[channel] = values
+    low = _LOW.astype(np.int32)
+    return planes.encoded(Latents((level,), low), (5, 3), 256, cell=1, support=_cells())
+
+
+def _cells() -> NDArray[np.bool_]:
+    return np.array([[True, True, True], [True, True, False]])
+
+
+def example() -> Iterator[str]:
+    """Lines of the worked example: fields, latents, samples."""
+    shown = _example()
+    for key, value in shown.packed.items():
+        yield f"{key:10} {value.hex(' ') if isinstance(value, bytes) else value}"
+    levels, lowest = shown.latents
+    for colour, plane in enumerate(lowest):
+        yield f"lowest plane of colour {colour}"
+        yield from grid(plane)
+    for channel in _HIGH:
+        yield f"level 1, channel {channel}"
+        yield from grid(levels[0][channel], planes.support_at(_cells(), 1, (5, 3), 1, 1))
+    for k, name in enumerate(("red", "green", "blue")):
+        yield f"{name}, in 8 bits"
+        yield from grid(np.rint(shown.raster[..., k] * 255).astype(int))
+
+
+def steps() -> Iterator[str]:
+    """Rows of the table of the symbols of the worked example."""
+    yield "| Set | Mean | Scale | s' | Part | Centre | Raw bits | Symbol | Latent |"
+    yield "|---|---|---|---|---|---|---|---|---|"
+    sets: list[tuple[Ints, Ints, Ints]] = []
+    code = planes._Decoder.code
+
+    def recorded(self: planes._Decoder, values: Ints, mean: Ints, scale: Ints) -> Ints:
+        out = code(self, values, mean, scale)
+        sets.append((mean, scale, out))
+        return out
+
+    fields = _example().packed
+    with (
+        mock.patch.object(planes._Decoder, "code", recorded),
+        mock.patch.object(kernel, "available", return_value=False),
+    ):
+        assert planes.unpack(fields).latents
+    for number, rows in enumerate(sets):
+        at = laplace.locate(*rows[:2])
+        for m, s, y, row, centre, shift in zip(*rows, *at, strict=True):
+            if row < 0:
+                continue
+            reach = int(laplace.tables().reach[row])
+            off = int((y >> shift) - centre)
+            coded = str(off + reach) if abs(off) <= reach else f"escape {off}"
+            low = f"{y & ((1 << shift) - 1)} in {shift}" if shift else "none"
+            cells = (number, m, s, row // 16, row % 16, centre, low, coded, y)
+            yield f"| {' | '.join(map(str, cells))} |"

@@ -1,0 +1,256 @@
+"""PLAN, and TEXR of the pyramid coder: order, numbers, and all that is refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import proxyimg_codec as pxi
+from proxyimg_codec.container.chunks import Chunk, read, write
+from proxyimg_codec.container.fields import pack
+from proxyimg_codec.container.file import parse, serialize
+from proxyimg_codec.container.texr import PYRAMID_FIELDS
+from proxyimg_codec.errors import FormatError, LimitError
+from proxyimg_codec.image import Layers
+from proxyimg_codec.limits import Limits
+from tests import pyramids
+from tests.pyramids import implicit, layers, picture, planes, view
+
+
+@pytest.fixture
+def soft(made_up_planes):
+    """A picture with alpha: planes 0 colour, 1 alpha."""
+    return picture(planes("colour"), planes("soft", components=1))
+
+
+@pytest.fixture
+def several(made_up_planes):
+    """A picture whose layers have planes of their own; the bar shows those of the disc."""
+    one, two = planes("one"), planes("two")
+    back, bar, disc = layers(one)
+    bar, disc = (replace(v, texture=replace(v.texture, planes=two)) for v in (bar, disc))
+    return replace(picture(), layers=Layers([back, bar, disc]))
+
+
+def test_files_come_back_to_the_byte(pyramid, soft, several):
+    for image in (pyramid, soft, several):
+        data = image.to_bytes()
+        again = pxi.from_bytes(data)
+        assert again.to_bytes() == data
+        np.testing.assert_array_equal(again.render(), image.render())
+        assert len({p for v in again.layers for p in v.texture.sources}) == len(
+            {p for v in image.layers for p in v.texture.sources}
+        )
+
+
+def test_planes_stand_once_between_networks_and_textures(pyramid, soft):
+    chunks = [c.type for c in read(pyramid.to_bytes())]
+    assert chunks == ["HEAD", *["LAYR"] * 3, "PLAN", *["TEXR"] * 3, "iNFO", "TAIL"]
+    assert [c.type for c in read(soft.to_bytes())].count("PLAN") == 2
+
+
+def test_planes_are_numbered_by_first_use(soft, several):
+    """Back to front, colour before alpha."""
+
+    def numbers(image):
+        c = parse(image.to_bytes())
+        names = [v["data"].decode() for v in c.planes]
+        return names, [(t["planes"], t["alpha"]) for t in c.textures]
+
+    assert numbers(soft) == (["colour", "soft"], [(0, 2)] * 3)
+    assert numbers(several) == (["one", "two"], [(0, 0), (1, 0), (1, 0)])
+    back, bar, disc = several.layers
+    other = replace(several, opaque=False, layers=Layers([bar, back, disc]))
+    assert numbers(other) == (["two", "one"], [(0, 0), (1, 0), (0, 0)])
+
+
+def test_equal_views_are_stored_once(pyramid):
+    """Views may share an object, or only be equal."""
+    disc = pyramid.layers["disc"]
+    equal = replace(disc.texture)
+    assert equal is not disc.texture
+    more = [replace(disc, name="a"), replace(disc, name="b", texture=equal)]
+    image = replace(pyramid, info=None, layers=Layers([*pyramid.layers, *more]))
+    c = parse(image.to_bytes())
+    assert [t.get("texture") for t in c.textures] == [None, None, None, 2, 2]
+    again = pxi.from_bytes(image.to_bytes())
+    assert again.layers["a"].texture is again.layers["b"].texture is again.layers["disc"].texture
+    assert again.to_bytes() == image.to_bytes()
+
+
+def refused(image, part, number, values, message, base=FormatError):
+    """Asserts that a file with changed fields is refused."""
+    container = parse(image.to_bytes())
+    old = getattr(container, part)
+    new = {**old, **values} if part == "head" else list(old)
+    if part != "head":
+        new[number] = {**old[number], **values}
+        new = tuple(new)
+    with pytest.raises(base, match=message):
+        parse(serialize(replace(container, **{part: new})))
+
+
+PARTS = [
+    [0, 0, 0, 48], [0, 0, 64, 0], [1, 0, 64, 48], [0, 1, 64, 48], [65, 0, 1, 1], [0, 0, 1 << 24, 1],
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_parts_lie_within_the_planes(pyramid, part):
+    refused(pyramid, "textures", 1, {"part": part}, "TEXR: the part is empty or leaves")
+    refused(pyramid, "textures", 0, {"part": part}, "TEXR: the part is empty or leaves")
+
+
+VIEWS = [
+    (1, {"planes": 1}, "TEXR: planes 1 do not exist"),
+    (2, {"alpha": 2}, "TEXR: planes 1 do not exist"),
+    (1, {"cell": 1}, "TEXR: cells without a mask"),
+    (0, {"alpha": 1}, "TEXR: planes of alpha are not grey"),
+    (2, {"coder": 1}, "TEXR.*not a map of coder, network"),
+    (2, {"coder": 0}, "TEXR.*not a map of coder, texture"),
+]
+
+
+@pytest.mark.parametrize(("number", "values", "message"), VIEWS)
+def test_views_are_checked(pyramid, number, values, message):
+    container = parse(pyramid.to_bytes())
+    chunks = read(pyramid.to_bytes())
+    at = [i for i, c in enumerate(chunks) if c.type == "TEXR"][number]
+    payload = pack(PYRAMID_FIELDS, {**container.textures[number], **values})
+    chunks[at] = Chunk("TEXR", payload)
+    with pytest.raises(FormatError, match=message):
+        parse(write(chunks))
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("cell", 7), ("cell", -1), ("planes", -1), ("alpha", (1 << 16) + 1), ("part", [0, 0, 1]),
+     ("part", [-1, 0, 2, 2])],
+)  # fmt: skip
+def test_fields_have_ranges(pyramid, key, value):
+    container = parse(pyramid.to_bytes())
+    with pytest.raises(ValueError, match=key):
+        pack(PYRAMID_FIELDS, {**container.textures[0], key: value})
+
+
+def test_alpha_is_grey_and_as_large(soft):
+    refused(soft, "planes", 1, {"components": 3}, "TEXR: planes of alpha are not grey")
+    refused(soft, "planes", 1, {"size": [64, 49]}, "TEXR: planes of alpha .* of another size")
+
+
+def test_alpha_is_announced(soft):
+    refused(soft, "head", 0, {"channels": 3}, "TEXR: more channels than HEAD has")
+    refused(soft, "head", 0, {"opaque": 1}, "back layer of an opaque file gives alpha")
+
+
+@pytest.mark.parametrize("sampling", [1, 2, 3])
+def test_nodes_need_an_implicit_texture(pyramid, sampling):
+    meshed = pyramid.layers["disc"].dragged({(32, 24): (3, 0)})
+    shared = meshed.layers["disc"].duplicated()
+    for image, number in ((meshed, 2), (shared, 3)):
+        message = "number of features" if number == 3 and sampling == 1 else "implicit texture"
+        refused(image.baked(), "layers", number, {"sampling": sampling}, message)
+
+
+def test_planes_are_all_used_and_in_order(several):
+    c = parse(several.to_bytes())
+    back, bar, disc = c.textures
+    for textures, message in (
+        ((back, {**bar, "planes": 0}, {**disc, "planes": 0}), "PLAN: planes 1 are not used"),
+        (({**back, "planes": 1}, bar, disc), "PLAN: planes are not in the order"),
+    ):
+        with pytest.raises(FormatError, match=message):
+            parse(serialize(replace(c, textures=textures)))
+    with pytest.raises(FormatError, match="PLAN: planes 2 are not used"):
+        parse(serialize(replace(c, planes=(*c.planes, c.planes[0]))))
+    with pytest.raises(FormatError, match="TEXR: planes 1 do not exist"):
+        parse(serialize(replace(c, planes=c.planes[:1])))
+
+
+def test_alpha_comes_after_its_colour(soft):
+    c = parse(soft.to_bytes())
+    swapped = tuple({**t, "planes": 1, "alpha": 1} for t in c.textures)
+    with pytest.raises(FormatError, match="PLAN: planes are not in the order"):
+        parse(serialize(replace(c, planes=c.planes[::-1], textures=swapped)))
+
+
+@pytest.mark.parametrize("to", [1, -2])
+def test_planes_out_of_place(pyramid, to):
+    chunks = read(pyramid.to_bytes())
+    chunk = chunks.pop(next(i for i, c in enumerate(chunks) if c.type == "PLAN"))
+    chunks.insert(to, chunk)
+    with pytest.raises(FormatError, match="out of order"):
+        parse(write(chunks))
+
+
+def test_an_implicit_texture_needs_a_network(made_up_planes):
+    c = parse(implicit().to_bytes())
+    with pytest.raises(FormatError, match="network 0 does not exist"):
+        parse(serialize(replace(c, head={**c.head, "networks": 0}, networks=())))
+
+
+@pytest.mark.parametrize("damage", ["cut", "long"])
+def test_damaged_masks_are_found_when_the_file_is_opened(pyramid, damage):
+    c = parse(pyramid.to_bytes())
+    mask = c.textures[0]["mask"]
+    broken = {**c.textures[0], "mask": mask[:-2] if damage == "cut" else mask + b"\0"}
+    data = serialize(replace(c, textures=(broken, *c.textures[1:])))
+    parse(data)
+    with pytest.raises(FormatError):
+        pxi.from_bytes(data)
+
+
+def test_limits_hold(pyramid):
+    data = pyramid.to_bytes()
+    filled = 64 * 48 + 31 * 30
+    parse(data, Limits(samples=64 * 48, filled=filled, codes=16 * 12 + 31 * 30, wavefronts=208))
+    for name, value in (
+        ("samples", 64 * 48 - 1), ("filled", filled - 1), ("codes", 16 * 12 + 31 * 30 - 1),
+        ("wavefronts", 64 + 3 * 48 - 1), ("wavefronts", 31 + 2 * 30 - 1),
+    ):  # fmt: skip
+        with pytest.raises(LimitError, match=name):
+            parse(data, Limits(**{name: value}))
+
+
+def test_all_planes_count(several):
+    with pytest.raises(LimitError, match="samples"):
+        parse(several.to_bytes(), Limits(samples=2 * 64 * 48 - 1))
+    parse(several.to_bytes(), Limits(samples=2 * 64 * 48))
+
+
+def test_huge_planes_are_refused_before_anything_is_decoded(pyramid, monkeypatch):
+    """Of few bytes, and so large that a raster of them would not fit in memory."""
+    c = parse(pyramid.to_bytes())
+    size = [1 << 23, 1 << 24]
+    huge = {**c.planes[0], "size": size}
+    whole = {**c.textures[1], "part": [0, 0, *size]}
+    monkeypatch.setattr(pyramids, "raster", None)
+    limits = Limits(wavefronts=1 << 30)
+    for textures in (c.textures, (c.textures[0], whole, c.textures[2])):
+        data = serialize(replace(c, planes=(huge,), textures=textures))
+        assert len(data) < 1000
+        with pytest.raises(LimitError, match="samples"):
+            pxi.from_bytes(data, limits)
+        with pytest.raises(LimitError, match="wavefronts"):
+            pxi.from_bytes(data)
+
+
+def test_opening_decodes_no_planes(pyramid, monkeypatch):
+    data = pyramid.to_bytes()
+    from proxyimg_codec.texture import planes as module
+
+    monkeypatch.setattr(module, "unpack", lambda fields, where: module.Planes(fields))
+    image = pxi.from_bytes(data)
+    assert image.to_bytes() == data
+    assert all("raster" not in p.__dict__ for v in image.layers for p in v.texture.sources)
+
+
+def test_views_of_other_parts(made_up_planes):
+    """A part need not lie where the box is, nor be as large."""
+    source = planes("colour")
+    image = picture(source)
+    back = replace(image.layers[0], texture=view(source, part=(5, 6, 7, 8)))
+    image = replace(image, layers=Layers([back, *image.layers[1:]]))
+    again = pxi.from_bytes(image.to_bytes())
+    assert again.layers[0].texture.part == (5, 6, 7, 8)
+    assert again.to_bytes() == image.to_bytes()

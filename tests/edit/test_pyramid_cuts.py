@@ -1,0 +1,295 @@
+"""Edits of a picture whose views are cut by boundaries: what is seen is what is saved."""
+
+import io
+import zipfile
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import proxyimg_codec as pxi
+from conformance.builders import ellipse
+from proxyimg_codec import pictures
+from proxyimg_codec.container.file import parse
+from proxyimg_codec.export import openraster
+from proxyimg_codec.geometry.boundary import Boundary
+from proxyimg_codec.image import Layers
+from proxyimg_codec.texture.cuts import Cuts
+from tests.edit.test_operations import EDITS, covered, grown
+from tests.pyramids import SIZE, cut_picture, implicit, planes, view
+from tests.texture.test_cuts import near
+
+
+@pytest.fixture
+def cut(made_up_planes):
+    """A picture of 64x48 pixels with the layers back, bar and disc, all cut."""
+    return cut_picture()
+
+
+def kinds(image):
+    """Cuts of each layer's TEXR, ``mask`` or the number of the layer whose texture it shares."""
+    return [
+        t["texture"] if t["coder"] == 0 else "mask" if t.get("mask") else t.get("cuts")
+        for t in parse(image.to_bytes()).textures
+    ]
+
+
+def same_when_loaded(image):
+    """Asserts that a picture, and each layer by itself, looks the same after saving."""
+    data = image.to_bytes()
+    again = pxi.from_bytes(data)
+    assert again.to_bytes() == data
+    np.testing.assert_array_equal(again.render(), image.render())
+    for layer in image.layers:
+        # Enlarged, so that samples beside those that the layer shows matter too.
+        alone = [v.render(layers=[layer.name], scale=2) for v in (image, again)]
+        np.testing.assert_array_equal(*alone)
+    return again
+
+
+def test_files_come_back_to_the_byte(cut):
+    assert kinds(cut) == [[1, 2], [1, 2], [2]]
+    again = same_when_loaded(cut)
+    back, bar, disc = again.layers
+    assert back.texture.cuts.fronts == (bar.boundary, disc.boundary)
+    assert (bar.texture.cuts.own, back.texture.cuts.own) == (bar.boundary, None)
+    assert disc.texture.cuts.box == disc.box
+
+
+def test_the_hole_is_not_what_was_there(cut):
+    hole = cut.render(layers=["back"])
+    flat = replace(cut.layers["back"], texture=view(planes("colour")))
+    shown = replace(cut, layers=Layers([flat]), info=None).render()
+    inside = np.hypot(*(np.mgrid[0:48, 0:64] - np.array([24, 32])[:, None, None])) < 12
+    assert np.abs(hole.astype(int) - shown)[inside].mean() > 10
+    np.testing.assert_array_equal(hole[:9], shown[:9])
+
+
+KEPT = {
+    "move": [[1, 2], [1, 2], [2]],
+    "rotate": [[1, 2], [1, 2], [2]],
+    "drag": [[1, 2], [1, 2], [2]],
+    "hide": [[1, 2], [1, 2], [2]],
+    "recolour": [[1, 2], [1, 2], [2]],
+    "rename": [[1, 2], [1, 2], [2]],
+    "duplicate": [[1, 2], [1, 2], [2], 2],
+    "order": [[1, 2], [1], "mask"],
+    "remove": ["mask", "mask"],
+    "point": ["mask", "mask", "mask"],
+    "texture": [[1, 2], [1, 2], 1],
+}
+"""What is left of the cuts after an edit of the disc."""
+
+
+@pytest.mark.parametrize("name", EDITS)
+@pytest.mark.parametrize("layer", ["disc", "bar"])
+def test_edits_look_the_same_when_loaded(cut, name, layer):
+    edited = EDITS[name](cut.layers[layer])
+    same_when_loaded(edited)
+    if layer == "disc" and name in KEPT:
+        assert kinds(edited) == KEPT[name]
+    for image in (edited, pxi.from_bytes(edited.to_bytes())):
+        assert image.undone().to_bytes() == cut.to_bytes()
+
+
+@pytest.mark.parametrize("name", ["move", "scale", "drag", "remove", "order", "duplicate"])
+def test_the_same_with_alpha(made_up_planes, name):
+    image = cut_picture(planes("colour"), planes("soft", components=1))
+    edited = EDITS[name](image.layers["disc"])
+    assert same_when_loaded(edited).channels == 4
+    assert edited.undone().to_bytes() == image.to_bytes()
+
+
+def test_there_and_back_is_exact(cut):
+    there = cut.layers["disc"].moved(9, -2.5)
+    assert there.baked().to_bytes() != cut.to_bytes()
+    assert there.layers["disc"].moved(-9, 2.5).baked().to_bytes() == cut.to_bytes()
+    old, new = ({(c.type, c.payload) for c in v.chunks} for v in (cut, there))
+    assert {t for t, _ in new - old} == {"POSE"}
+
+
+def test_a_removed_object_leaves_nothing(cut):
+    """What lies within 2 samples of it is filled, in whole cells; the rest is not touched."""
+    gone = cut.layers["disc"].removed()
+    spoilt = near(covered(cut, "disc"))
+    for layer in gone.layers:
+        x, y, w, h = layer.box
+        assert not (layer.texture.shown & spoilt[y : y + h, x : x + w]).any()
+    cells = spoilt.reshape(24, 2, 32, 2).any((1, 3)).repeat(2, 0).repeat(2, 1)
+    changed = (gone.render() != cut.render()).any(-1)
+    assert changed[spoilt].mean() > 0.9
+    assert not changed[~cells].any()
+
+
+def test_masks_trust_nobody_where_a_boundary_was(cut):
+    """Where it is the layer's own, or in front of it, as before, mixed samples stay."""
+    _, bar, disc = cut.layers
+    left = {
+        "remove": {"back": (None, [bar.boundary]), "bar": (bar.boundary,)},
+        "point": {"back": (None, [bar.boundary]), "bar": (bar.boundary,), "disc": ()},
+        "order": {"bar": (bar.boundary,)},
+    }
+    for name, layers in left.items():
+        edited = EDITS[name](disc)
+        for layer, kept in layers.items():
+            expected = cut.layers[layer].texture.masked(*kept).mask
+            np.testing.assert_array_equal(edited.layers[layer].texture.mask, expected)
+            trusted = cut.layers[layer].texture.masked().mask
+            assert (edited.layers[layer].texture.mask != trusted).any() == (kept != ())
+
+
+def test_a_white_object_on_black_leaves_no_grey(made_up_planes):
+    """Hidden, it leaves the rim that it is mixed into; removed, not even that."""
+    shape = Boundary(4, (ellipse((31, 23), (13, 11)),))
+    image = stack([(0, 0, *SIZE), (16, 10, 30, 26)], [None, shape], [[1], [1]])
+    back = image.layers[0].texture
+    white = grown(covered(image, "1"), 1)
+    back.planes.__dict__["raster"] = white[..., None].repeat(3, 2).astype(np.float32)
+    hidden = image.layers["1"].hidden().render()
+    np.testing.assert_array_equal(hidden, 255 * (white & back.shown)[..., None].repeat(3, 2))
+    assert image.layers["1"].removed().render().max() == 0
+
+
+def test_orders_that_leave_all_fronts_in_front(cut):
+    """The numbers in the file follow; a copy may stand for the original."""
+    both = cut.layers["disc"].duplicated("twin")
+    assert kinds(both) == [[1, 2], [1, 2], [2], 2]
+    assert kinds(both.layers["disc"].removed()) == [[1, 2], [1, 2], [2]]
+    loaded = pxi.from_bytes(both.to_bytes())
+    assert kinds(loaded.layers["disc"].removed()) == [[1, 2], [1, 2], [2]]
+    swapped = both.layers["twin"].reordered(1)
+    assert kinds(swapped) == [[1, 2], [1], [2, 3], 1]
+    for image in (both, swapped, both.layers["disc"].removed()):
+        same_when_loaded(image)
+    bare = cut.layers["back"].removed()
+    assert kinds(bare) == [[0, 1], [1]]
+    same_when_loaded(bare)
+
+
+def test_copies_in_front_of_the_back_are_masked_with_it(cut):
+    """Who shows a view first has to have the box that it was cut in."""
+    lent = cut.layers["bar"].textured("disc")
+    assert kinds(lent) == [[1, 2], "mask", 1]
+    own = cut.layers["disc"]
+    assert lent.layers["bar"].texture is lent.layers["disc"].texture
+    expected = own.texture.masked(own.boundary).mask
+    np.testing.assert_array_equal(lent.layers["disc"].texture.mask, expected)
+    same_when_loaded(lent)
+    back = cut.layers["disc"].textured("back")
+    assert kinds(back) == [[1, 2], [1, 2], 0]
+    same_when_loaded(back)
+
+
+def test_copies_that_lie_elsewhere(made_up_planes):
+    whole, shape = (0, 0, *SIZE), rectangle(5, 5, 50, 40)
+    image = stack([(8, 6, 30, 25), whole, whole], [shape, None, shape], [[], [2], []])
+    lent = image.layers["0"].textured("1")
+    assert kinds(lent) == ["mask", 0, []]
+    same_when_loaded(lent)
+    bare = image.layers["2"].textured("1").layers["1"].removed()
+    assert kinds(bare) == [[], "mask"]  # it is not in front of itself
+    view = image.layers["1"].texture
+    np.testing.assert_array_equal(bare.layers["2"].texture.mask, view.masked().mask)
+    assert (view.masked().mask != view.masked(None, [shape]).mask).any()
+
+
+def test_groups_scripts_and_undo(cut):
+    script = [
+        {"op": "group", "layers": ["bar", "disc"], "name": "both"},
+        {"op": "move", "layer": "both", "by": [3, 4]},
+        {"op": "duplicate", "layer": "bar"},
+        {"op": "point", "layer": "disc", "path": 0, "point": 0, "by": [3, -2]},
+        {"op": "order", "layer": "disc", "to": "back"},
+        {"op": "remove", "layer": "both"},
+    ]
+    edited = cut.edited(*script)
+    for steps in range(1, len(script)):
+        before = cut.edited(*script[:-steps])
+        same_when_loaded(before)
+        assert edited.undone(steps).to_bytes() == before.to_bytes()
+    assert edited.undone(len(script)).to_bytes() == cut.to_bytes()
+
+
+@pytest.mark.parametrize("fit", ["box", "shape"])
+@pytest.mark.parametrize("name", ["back", "bar", "disc"])
+def test_textures_for_other_files(cut, made_up_planes, tmp_path, fit, name):
+    cut.save(tmp_path / "cut.pxi")
+    for image in (implicit(), cut_picture(planes("other"))):
+        changed = image.layers["disc"].textured(str(tmp_path / "cut.pxi"), name, fit)
+        same_when_loaded(changed)
+        taken = changed.layers["disc"].texture
+        if name == "disc" and image.networks == ():  # box and outline are the same
+            assert kinds(changed) == [[1, 2], [1, 2], [2]]
+            continue
+        assert kinds(changed)[2] == "mask"
+        np.testing.assert_array_equal(taken.mask, cut.layers[name].texture.masked().mask)
+
+
+def test_openraster_has_what_is_hidden(cut):
+    pytest.importorskip("OpenImageIO")
+    with zipfile.ZipFile(io.BytesIO(openraster.build(cut))) as archive:
+        back = pictures.parse(archive.read("data/layer0.png"), "back").pixels
+    np.testing.assert_array_equal(back, cut.render(layers=["back"]))
+
+
+def rectangle(x0, y0, x1, y1):
+    corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
+    after = np.roll(corners, -1, 0)
+    return Boundary(0, (np.stack([corners, corners, after], 1).reshape(-1, 2),))
+
+
+def stack(boxes, boundaries, numbers, placed=True):
+    """A picture of layers 0, 1, ..., whose views are cut by layers `numbers`.
+
+    Each shows what the raster has in its place, or if not `placed` its top left corner.
+    """
+    colour = planes("colour")
+    layers = [
+        replace(
+            cut_picture(colour).layers[0],
+            name=str(k),
+            box=box,
+            boundary=boundary,
+            texture=view(
+                colour,
+                part=box if placed else (0, 0, *box[2:]),
+                cuts=Cuts.of(by, k, boundaries, box),
+            ),
+        )
+        for k, (box, boundary, by) in enumerate(zip(boxes, boundaries, numbers, strict=True))
+    ]
+    return replace(cut_picture(colour), layers=Layers(layers), info=None)
+
+
+@pytest.mark.parametrize("region", [None, (20, 11, 23, 17)])
+def test_a_picture_at_rest_needs_no_fill(made_up_planes, region):
+    """It looks like its planes wherever outlines run, alone or where they meet."""
+    ellipses = (ellipse((20, 21), (13, 11)), ellipse((37, 26), (12, 17)))
+    shapes = [None, *(Boundary(4, (v,)) for v in ellipses), rectangle(10, 8, 36, 29)]
+    boxes = [(0, 0, *SIZE), (5, 8, 30, 26), (23, 7, 28, 38), (8, 6, 30, 25)]
+    image = stack(boxes, shapes, [[1, 2, 3], [1, 2, 3], [2, 3], [3]])
+    shown = image.render(dtype=np.float32, region=region)
+    x, y, w, h = region or (0, 0, *SIZE)
+    raster = planes("colour").raster[y : y + h, x : x + w]
+    np.testing.assert_allclose(shown, raster, atol=1e-6)
+    assert all(not v.texture.shown.all() for v in image.layers)
+    assert not any("filled" in v.texture.__dict__ for v in image.layers)
+    image.layers["1"].moved(3, 0).render()
+    assert "filled" in image.layers["0"].texture.__dict__
+
+
+def test_equal_numbers_may_mean_different_samples(made_up_planes):
+    """Such views are not stored as one."""
+    whole, shape = (0, 0, *SIZE), rectangle(5, 5, 50, 40)
+    front = stack([whole, whole], [None, shape], [[1], [1]])
+    assert kinds(front) == [[1], [1]]
+    same_when_loaded(front)
+    boxes = [whole, (0, 0, 30, 20), (9, 4, 30, 20), (9, 4, 30, 20)]
+    apart = stack(
+        boxes, [None, shape, shape, rectangle(20, 10, 60, 30)], [[], [3], [3], [3]], False
+    )
+    assert kinds(apart) == [[], [3], [3], [3]]
+    same_when_loaded(apart)
+    alike = stack([whole, whole, whole], [None, None, shape], [[2], [2], []])
+    assert kinds(alike) == [[2], 0, []]
+    same_when_loaded(alike)

@@ -1,0 +1,230 @@
+"""What boundaries at rest leave of views: the samples that show, and those that are trusted."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from conformance.builders import ellipse, polygon
+from proxyimg_codec.geometry.boundary import Boundary
+from proxyimg_codec.texture import cuts as module
+from proxyimg_codec.texture.cuts import Cuts
+from proxyimg_codec.texture.diffusion import diffused
+from proxyimg_codec.texture.pyramid import FILL_ONE
+from tests.pyramids import planes, view
+
+UNIT = 4
+PART = 7, 4, 21, 18
+"""Of planes of 40x30."""
+
+
+def rectangle(x0, y0, x1, y1):
+    """A boundary of edges in 1/16 px."""
+    corners = ((x0, y0), (x1, y0), (x1, y1), (x0, y1))
+    return Boundary(UNIT, (polygon(*((x / 16, y / 16) for x, y in corners)),))
+
+
+def share(low, high, pixel):
+    """How much of a pixel lies between two edges in 1/16 px."""
+    return Fraction(max(min(high, 16 * pixel + 16) - max(low, 16 * pixel), 0), 16)
+
+
+edges = st.tuples(*[st.integers(-60, 300)] * 4).map(
+    lambda v: (min(v[0], v[1]), min(v[2], v[3]), max(v[0], v[1]) + 1, max(v[2], v[3]) + 1)
+)
+
+
+def near(samples):
+    """Where a sample is set within 2 across and 2 down."""
+    height, width = samples.shape
+    return np.array(
+        [[samples[max(j - 2, 0) : j + 3, max(i - 2, 0) : i + 3].any() for i in range(width)]
+         for j in range(height)]
+    )  # fmt: skip
+
+
+@given(st.none() | edges, st.lists(edges, max_size=3), st.integers(-5, 12), st.integers(-5, 12))
+def test_the_rule_for_rectangles(own, fronts, x, y):
+    """Their coverage is the product of how far they cover a pixel across and down."""
+    box = (x, y, 9, 6)
+    cuts = Cuts(own and rectangle(*own), tuple(rectangle(*v) for v in fronts), box)
+
+    def covered(edge):
+        return np.array(
+            [[share(edge[0], edge[2], x + i) * share(edge[1], edge[3], y + j) for i in range(9)]
+             for j in range(6)]
+        )  # fmt: skip
+
+    lost = [covered(v) for v in fronts] + ([] if own is None else [1 - covered(own)])
+    most = np.max(lost, axis=0, initial=Fraction(0)) if lost else np.zeros((6, 9))
+    shown, trusted = most < 1, ~near(most > 0)
+    shown = shown if shown.any() else ~shown
+    np.testing.assert_array_equal(cuts.shown, shown)
+    np.testing.assert_array_equal(cuts.trusted, trusted if trusted.any() else shown)
+    assert not (cuts.trusted & ~cuts.shown).any()
+
+
+def test_the_rule_for_curves():
+    """Against ellipses a little smaller and larger, whose points in 32x32 squares a pixel count."""
+    shapes = ((19, 16), (16, 14)), ((29, 12), (8, 8)), ((5, 17), (7, 6))
+    own, *fronts = (Boundary(UNIT, (ellipse(*v),)) for v in shapes)
+    cuts = Cuts(own, tuple(fronts), (2, 1, 38, 32))
+    y, x = np.mgrid[0 : 32 * 32 + 1, 0 : 38 * 32 + 1] / 32
+
+    def covered(shape, larger):
+        """Whether some of a pixel is inside, and whether all is."""
+        (cx, cy), (rx, ry) = shape
+        inside = np.hypot((x + 2 - cx) / (rx + larger), (y + 1 - cy) / (ry + larger)) < 1
+        parts = [inside[j : j - 1 or None, i : i - 1 or None] for j in (0, 1) for i in (0, 1)]
+        pixels = np.stack([p[:1024, :1216].reshape(32, 32, 38, 32) for p in parts])
+        return pixels.any((0, 2, 4)), pixels.all((0, 2, 4))
+
+    bounds = []
+    for sign in (-1, 1):  # least and most of what is shown and trusted
+        some, whole = covered(shapes[0], 0.1 * sign)
+        others = [covered(v, -0.1 * sign) for v in shapes[1:]]
+        bounds.append((some & ~others[0][1] & ~others[1][1],
+                       ~near(~whole | others[0][0] | others[1][0])))  # fmt: skip
+    for k, found in enumerate((cuts.shown, cuts.trusted)):
+        least, most = bounds[0][k], bounds[1][k]
+        assert not (least & ~found).any()
+        assert not (found & ~most).any()
+        assert (most & ~least).mean() < 0.1
+        assert 100 < found.sum() < 1000
+    rim = cuts.shown & ~cuts.trusted
+    assert rim.sum() > 200
+
+
+def test_bands_do_not_show(monkeypatch):
+    shapes = tuple(Boundary(UNIT, (ellipse(*v),)) for v in (((14, 11), (13, 9)), ((20, 8), (7, 7))))
+    whole = Cuts(shapes[0], shapes[1:], PART)
+    kept = whole.shown, whole.trusted
+    monkeypatch.setattr(module, "BAND", 50)
+    again = Cuts(shapes[0], shapes[1:], PART)
+    np.testing.assert_array_equal((again.shown, again.trusted), kept)
+
+
+def test_if_none_would_show_all_do():
+    everything = rectangle(-1000, -1000, 10000, 10000)
+    for cuts in (Cuts(None, (everything,), PART), Cuts(rectangle(0, 0, 16, 16), (), PART)):
+        assert cuts.shown.all()
+        assert cuts.trusted.all()
+    assert (
+        view(planes("a", (40, 30)), part=PART, cuts=Cuts(None, (everything,), PART)).shown is None
+    )
+
+
+@pytest.mark.parametrize(("across", "columns"), [(4, [5, 6, 7, 8]), (5, [7]), (6, [7, 8])])
+def test_if_none_can_be_trusted_all_that_show_are(across, columns):
+    """The inner ones of 5 across are 3 away from what is not the layer's; of 4 across none are."""
+    x, y, _, h = PART
+    cuts = Cuts(rectangle(*(16 * v for v in (x + 5, y, x + 5 + across, y + h))), (), PART)
+    assert np.flatnonzero(cuts.shown.all(0)).tolist() == list(range(5, 5 + across))
+    assert np.flatnonzero(cuts.trusted.all(0)).tolist() == columns
+    assert cuts.trusted.any(0).sum() == len(columns)
+
+
+@pytest.fixture
+def cut():
+    """A view from which a disc and what is beside a rectangle are cut."""
+    own = rectangle(8 * 16 + 8, 5 * 16 + 3, 26 * 16, 21 * 16)
+    return view(planes("a", (40, 30)), part=PART,
+                cuts=Cuts(own, (Boundary(UNIT, (ellipse((17, 12), (5, 4)),)),), PART))  # fmt: skip
+
+
+def centres(at):
+    y, x = np.nonzero(at)
+    return x + PART[0] + 0.5, y + PART[1] + 0.5
+
+
+def test_others_are_filled_from_those_that_can_be_trusted(cut):
+    x0, y0, w, h = PART
+    crop = cut.planes.raster[y0 : y0 + h, x0 : x0 + w]
+    shown, trusted = cut.cuts.shown, cut.cuts.trusted
+    assert 0 < trusted.sum() < shown.sum() < shown.size
+    fixed = np.where(trusted[..., None], np.rint(crop * FILL_ONE), 0).astype(np.int32)
+    filled = np.moveaxis(diffused(np.moveaxis(fixed, 2, 0), trusted), 0, 2) / FILL_ONE
+    got = cut.sample(*centres(shown | True), PART).reshape(h, w, 3)
+    np.testing.assert_array_equal(got[shown], crop[shown])
+    np.testing.assert_allclose(got[~shown], filled[~shown], atol=1e-6)
+    assert np.abs(crop - filled)[shown & ~trusted].max() > 0.02
+
+
+def test_filling_waits_until_it_is_needed(cut):
+    shown = cut.cuts.shown
+    cut.sample(*centres(shown), PART)
+    assert "filled" not in cut.__dict__
+    cut.sample(*(v[:1] for v in centres(~shown)), PART)
+    assert "filled" in cut.__dict__
+
+
+def test_what_lasts(cut):
+    """Near boundaries that are gone only trusted samples do, at others all that show."""
+    own, (disc,) = cut.cuts.own, cut.cuts.fronts
+    twin = Boundary(disc.unit, tuple(p.copy() for p in disc.paths))
+    inner, outer = Cuts(own, (), PART), Cuts(None, (disc,), PART)
+    for there, kept in [
+        ((None, [own]), cut.cuts.trusted),
+        ((disc, []), cut.cuts.trusted),
+        ((own, [None]), inner.shown & outer.trusted),
+        ((None, [own, twin]), inner.trusted & outer.shown),
+        ((own, [twin]), cut.cuts.shown),
+    ]:
+        np.testing.assert_array_equal(cut.cuts.lasting(*there), kept)
+    small = Cuts(rectangle(128, 96, 160, 128), (disc,), PART)
+    assert 0 < small.shown.sum() < small.shown.size
+    np.testing.assert_array_equal(small.lasting(None, []), small.shown)
+
+
+@pytest.mark.parametrize("size", [(21, 18), (1, 1), (1, 6), (7, 2), (5, 5)])
+@pytest.mark.parametrize("there", [False, True])
+def test_a_mask_instead_has_the_cells_that_are_kept_as_a_whole(size, there):
+    box = (0, 0, *size)
+    disc = Boundary(UNIT, (ellipse((2, 2), (2, 2)),))
+    texture = view(planes("a", (40, 30)), part=box, cuts=Cuts(None, (disc,), box))
+    left = None, [disc] * there
+    kept, masked = texture.cuts.lasting(*left), texture.masked(*left)
+    assert masked.cuts is None
+    cells = np.array(
+        [[kept[2 * j : 2 * j + 2, 2 * i : 2 * i + 2].all() for i in range(-(-size[0] // 2))]
+         for j in range(-(-size[1] // 2))]
+    )  # fmt: skip
+    assert cells.all() if masked.mask is None else (masked.mask == cells).all()
+    assert masked.cell == (masked.mask is not None)
+    assert masked.masked() is masked
+
+
+def test_a_mask_instead_is_never_empty():
+    """Without a whole cell, cells belong of which a part does; if these are all, there is none."""
+    box = (0, 0, 6, 4)
+    small = rectangle(16, 16, 32, 48)
+    texture = view(planes("a", (40, 30)), part=box, cuts=Cuts(small, (), box))
+    assert texture.cuts.shown.sum() == 2
+    for own in (None, small):
+        assert texture.masked(own).mask.tolist() == [[True, False, False]] * 2
+    line, box = rectangle(16, 0, 32, 64), (0, 0, 2, 4)
+    thin = view(planes("a", (40, 30)), part=box, cuts=Cuts(line, (), box))
+    assert thin.cuts.shown.tolist() == [[False, True]] * 4
+    assert (thin.masked().mask, thin.masked().cell) == (None, 0)
+
+
+def test_numbers():
+    """Layers are found by what their boundaries are, the same object before an equal one."""
+    a, b, c = (rectangle(0, 0, 16 * k, 16) for k in (1, 2, 3))
+    twin = rectangle(0, 0, 32, 16)
+    other = Boundary(UNIT + 1, tuple(2 * p for p in b.paths))
+    cuts = Cuts.of([1, 2, 3], 1, [None, a, b, c], PART)
+    assert (cuts.own, cuts.fronts) == (a, (b, c))
+    assert cuts.numbers(1, [None, a, b, c]) == [1, 2, 3]
+    assert cuts.numbers(1, [None, a, c, b]) == [1, 2, 3]
+    assert cuts.numbers(0, [a, None, c, None, b, b]) == [0, 2, 4]
+    assert cuts.numbers(1, [None, a, twin, c]) == [1, 2, 3]
+    assert cuts.numbers(1, [None, a, twin, b, c]) == [1, 3, 4]
+    for gone in ([None, a, b], [None, b, a, c], [None, a, other, c], [b, a, c], [None, None, b, c]):
+        assert cuts.numbers(1, gone) is None
+    front = Cuts.of([2], 0, [None, a, b], PART)
+    assert (front.own, front.fronts) == (None, (b,))
+    assert front.numbers(0, [None, b, b]) == [1]
+    assert Cuts.of([], 0, [None], PART) is None

@@ -1,0 +1,1 @@
+"""How the registered pyramid model is trained; see README.md."""

@@ -1,0 +1,103 @@
+"""Crops for training: photographs and graphics of a folder, and drawn shapes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Pixels = NDArray[np.uint8]
+
+SIZE = 256
+DRAWN = 0.06
+"""Share of crops that are drawn shapes: flat colours and sharp edges are rare in photographs."""
+
+
+def load(folder: Path) -> list[Pixels]:
+    """All pictures of a folder as RGB [H, W, 3], in the order of their names."""
+    found = []
+    for path in sorted(folder.iterdir()):
+        picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
+        if picture is not None and min(picture.shape[:2]) >= SIZE:
+            found.append(np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), np.uint8))
+    return found
+
+
+def crop(pictures: list[Pixels], rng: np.random.Generator) -> Pixels:
+    """A random crop [SIZE, SIZE, 3], as cameras, scanners and websites would have made it."""
+    if rng.random() < DRAWN:
+        return drawn(rng)
+    picture = pictures[rng.integers(len(pictures))]
+    height, width = picture.shape[:2]
+    kind = rng.random()
+    scale = 1.0
+    if kind < 0.3:
+        scale = rng.uniform(0.5, 1.0)
+    elif kind < 0.65:
+        scale = rng.uniform(1.0, 1.5)  # the pictures were reduced: others are softer
+    side = min(round(SIZE / scale), height, width)
+    y, x = rng.integers(height - side + 1), rng.integers(width - side + 1)
+    part = picture[y : y + side, x : x + side]
+    if side != SIZE:
+        way = cv2.INTER_AREA if side > SIZE and rng.random() < 0.5 else cv2.INTER_CUBIC
+        part = np.asarray(cv2.resize(part, (SIZE, SIZE), interpolation=way), np.uint8)
+    if rng.random() < 0.6:
+        part = half_chroma(part)
+    if rng.random() < 0.2:
+        part = grainy(part, rng)
+    if rng.random() < 0.5:
+        part = part[:, ::-1]
+    if rng.random() < 0.3:
+        part = part[::-1]
+    if rng.random() < 0.3:
+        part = part.transpose(1, 0, 2)
+    return np.ascontiguousarray(part)
+
+
+def half_chroma(picture: Pixels) -> Pixels:
+    """The picture with chroma of half the resolution, as most cameras and JPEG leave it."""
+    planes = cv2.cvtColor(picture, cv2.COLOR_RGB2YCrCb)
+    small = cv2.resize(planes[..., 1:], (SIZE // 2, SIZE // 2), interpolation=cv2.INTER_AREA)
+    planes[..., 1:] = cv2.resize(small, (SIZE, SIZE), interpolation=cv2.INTER_LINEAR)
+    return np.asarray(cv2.cvtColor(planes, cv2.COLOR_YCrCb2RGB), np.uint8)
+
+
+def grainy(picture: Pixels, rng: np.random.Generator) -> Pixels:
+    """The picture with grain in its luma."""
+    grain = rng.normal(0, rng.uniform(1, 5), (SIZE, SIZE, 1)).astype(np.float32)
+    soft = np.asarray(cv2.GaussianBlur(grain, (0, 0), rng.uniform(0.3, 0.8)))[..., None]
+    return np.asarray(np.clip(np.rint(picture + soft), 0, 255), np.uint8)
+
+
+def drawn(rng: np.random.Generator) -> Pixels:
+    """Random shapes and letters over a gradient."""
+    shift = 4
+    top, bottom = rng.integers(0, 256, (2, 3))
+    ramp = np.linspace(0, 1, SIZE)[:, None, None] * np.ones((1, SIZE, 1))
+    canvas = (top + (bottom - top) * ramp).astype(np.uint8)
+    if rng.random() < 0.5:
+        canvas = canvas.transpose(1, 0, 2)
+    canvas = np.ascontiguousarray(canvas)
+    for _ in range(rng.integers(2, 12)):
+        colour = [int(v) for v in rng.integers(0, 256, 3)]
+        centre = rng.integers(0, SIZE, 2)
+        kind = rng.integers(4)
+        if kind == 0:
+            radius = int(rng.integers(4, 90)) << shift
+            at = [int(v) << shift for v in centre]
+            cv2.circle(canvas, at, radius, colour, -1, cv2.LINE_AA, shift)
+        elif kind == 1:
+            points = (centre + rng.normal(0, 50, (int(rng.integers(3, 7)), 2))) * (1 << shift)
+            cv2.fillPoly(canvas, [points.astype(np.int32)], colour, cv2.LINE_AA, shift)
+        elif kind == 2:
+            other = rng.integers(0, SIZE, 2)
+            thick = int(rng.integers(1, 8))
+            cv2.line(canvas, centre.tolist(), other.tolist(), colour, thick, cv2.LINE_AA)
+        else:
+            text = "".join(chr(rng.integers(33, 127)) for _ in range(rng.integers(1, 8)))
+            face, size = int(rng.integers(0, 8)), float(rng.uniform(0.4, 3))
+            corner = (int(centre[0]) - 60, int(centre[1]))
+            cv2.putText(canvas, text, corner, face, size, colour, int(size) + 1, cv2.LINE_AA)
+    return canvas

@@ -1,0 +1,184 @@
+"""Trains the pyramid model: python -m training.train FOLDER --out STATE.pt; see README.md."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from proxyimg_codec.encoder.pyramid.model import Model
+from proxyimg_codec.encoder.pyramid.rate import bits_of_integers
+from proxyimg_codec.encoder.pyramid.refine import (
+    DEAD_ZONE,
+    RATE_WEIGHT,
+    Target,
+    cost,
+    moved,
+    shrunk,
+)
+
+from .pictures import Pixels, crop, load
+
+BATCH = 4
+STEPS = (3.0, 160.0)
+"""Range of quantization steps, log-uniform."""
+ROUNDS = 10
+"""Rounds of refinement that a batch of latents gets in the second phase."""
+
+
+def main() -> None:
+    """Command line."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--phase", type=int, choices=(1, 2), default=1)
+    parser.add_argument("--from", dest="start", type=Path, help="model to start from")
+    parser.add_argument("--steps", type=int, default=6000)
+    parser.add_argument("--rate", type=float, default=1.0, help="multiplies the learning rates")
+    parser.add_argument("--range", type=float, nargs=2, default=STEPS, metavar=("LOW", "HIGH"),
+                        help="range of quantization steps")  # fmt: skip
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--threads", type=int, default=2)
+    args = parser.parse_args()
+    torch.set_num_threads(args.threads)
+    torch.manual_seed(args.seed)
+    model = Model()
+    model.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+    state: dict[str, Any] = {}
+    if args.out.exists():
+        state = torch.load(args.out)
+    elif args.start:
+        state = {"model": torch.load(args.start)["model"]}
+    if state:
+        model.load_state_dict(state["model"])
+    pictures = load(args.folder)
+    run = analysed if args.phase == 1 else refined
+    run(model, pictures, state, args)
+
+
+def batch(
+    pictures: list[Pixels], rng: np.random.Generator, steps: tuple[float, float]
+) -> tuple[Tensor, Tensor]:
+    """Pictures [B, 3, S, S] in 0..255 and their quantization steps [B]."""
+    crops = np.stack([crop(pictures, rng) for _ in range(BATCH)]).transpose(0, 3, 1, 2)
+    step = np.exp(rng.uniform(math.log(steps[0]), math.log(steps[1]), BATCH))
+    x = torch.from_numpy(crops.astype(np.float32)).to(memory_format=torch.channels_last)
+    return x, torch.from_numpy(step.astype(np.float32))
+
+
+def groups_of(model: Model, *, analysis: bool, rate: float) -> list[dict[str, Any]]:
+    """Parameter groups; what is linear and starts from the wavelet moves slowly."""
+    slow: list[Tensor] = []
+    fast: list[Tensor] = []
+    for name, parameter in model.named_parameters():
+        if not analysis and ("analysis" in name or name == "to_planes"):
+            parameter.requires_grad_(False)
+            continue
+        linear = "_delta" in name or name in ("to_planes", "to_colour")
+        (slow if linear else fast).append(parameter)
+    return [
+        {"params": fast, "lr": rate, "base": rate},
+        {"params": slow, "lr": rate * 0.05, "base": rate * 0.05},
+    ]
+
+
+class Journal:
+    """Counts steps, prints means, saves the state."""
+
+    def __init__(self, model: Model, opt: torch.optim.Optimizer, state: dict[str, Any], args: Any):
+        self.model, self.opt, self.args = model, opt, args
+        self.done = state.get("done", 0)
+        if "optimizer" in state:
+            opt.load_state_dict(state["optimizer"])
+        self.start = time.time()
+        self.rows: list[tuple[float, float]] = []
+
+    def rng(self) -> np.random.Generator:
+        """Random numbers of the present step: a resumed run draws what an unbroken one does."""
+        torch.manual_seed(self.args.seed * 1_000_003 + self.done)
+        return np.random.default_rng((self.args.seed, self.done))
+
+    def set_rates(self) -> None:
+        """Warm-up, then a cosine."""
+        share = self.done / self.args.steps
+        scale = min(1, (self.done + 1) / 100) * (0.5 + 0.5 * math.cos(math.pi * share))
+        for group in self.opt.param_groups:
+            group["lr"] = group["base"] * (scale * 0.99 + 0.01)
+
+    def add(self, distortion: Tensor, rate: Tensor) -> None:
+        """Records a step; saves now and then, and at the end."""
+        self.done += 1
+        self.rows.append((distortion.mean().item(), rate.mean().item()))
+        if self.done % 100 == 0 or self.done >= self.args.steps:
+            d, r = np.mean(self.rows, 0)
+            spent = time.time() - self.start
+            print(f"{self.done} {spent:.0f}s D {d:.4f} R {r:.4f} J {d + RATE_WEIGHT * r:.4f}",
+                  flush=True)  # fmt: skip
+            self.rows = []
+            state = {"model": self.model.state_dict(), "optimizer": self.opt.state_dict()}
+            temporary = self.args.out.with_suffix(".part")
+            torch.save({**state, "done": self.done}, temporary)
+            temporary.rename(self.args.out)
+
+
+def analysed(model: Model, pictures: list[Pixels], state: dict[str, Any], args: Any) -> None:
+    """Phase 1: everything at once; latents come from the analysis, rounded straight through."""
+    rate = 2e-3 * args.rate
+    opt = torch.optim.Adam(groups_of(model, analysis=True, rate=rate), betas=(0.9, 0.99))
+    journal = Journal(model, opt, state, args)
+    while journal.done < args.steps:
+        journal.set_rates()
+        x, step = batch(pictures, journal.rng(), args.range)
+        latents = [y + (torch.round(y) - y).detach() for y in model.analyse(x, step)]
+        likely = model.likelihoods(latents, step)
+        pixels = x.shape[2] * x.shape[3]
+        distortion = ((model.synthesise(latents, step) - x) ** 2).sum((1, 2, 3)) / step**2 / pixels
+        coded = zip(latents, likely, strict=False)
+        spent = torch.zeros(BATCH)
+        for y, p in coded:
+            spent = spent + bits_of_integers(y, *p).sum((1, 2, 3)) / pixels
+        opt.zero_grad(set_to_none=True)
+        (distortion + RATE_WEIGHT * spent).mean().backward()  # type: ignore[no-untyped-call]
+        torch.nn.utils.clip_grad_norm_(model.parameters(), 1.0)
+        opt.step()
+        journal.add(distortion, spent)
+
+
+def refined(model: Model, pictures: list[Pixels], state: dict[str, Any], args: Any) -> None:
+    """Phase 2: synthesis and context learn on latents while these are refined, in integers."""
+    model.set_mode(integer=True)
+    opt = torch.optim.Adam(groups_of(model, analysis=False, rate=6e-4 * args.rate),
+                           betas=(0.9, 0.99))  # fmt: skip
+    kept = [p for g in opt.param_groups for p in g["params"]]
+    journal = Journal(model, opt, state, args)
+    while journal.done < args.steps:
+        x, step = batch(pictures, journal.rng(), args.range)
+        random = torch.Generator().manual_seed(journal.done)
+        target = Target(x, None, None, None, step)
+        with torch.no_grad():
+            now = [torch.round(y) for y in shrunk(model.analyse(x, step), DEAD_ZONE)]
+        for turn in range(ROUNDS):
+            ys = [y.contiguous(memory_format=torch.channels_last).requires_grad_() for y in now]
+            spent = cost(model, target, ys, smooth=False)
+            opt.zero_grad(set_to_none=True)
+            spent.total.backward()  # type: ignore[no-untyped-call]
+            slopes = [y.grad for y in ys if y.grad is not None]
+            now = moved(model, step, [y.detach() for y in ys], spent.likely, slopes, random)
+            if turn > 0:  # the first rounding is not what will be coded
+                journal.set_rates()
+                torch.nn.utils.clip_grad_norm_(kept, 2e5)
+                opt.step()
+                pixels = x.shape[2] * x.shape[3]
+                journal.add(spent.error.detach() / pixels, spent.spent.detach() / pixels)
+            if journal.done >= args.steps:
+                return
+
+
+if __name__ == "__main__":
+    main()
