@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+
+from proxyimg_codec.errors import InputError
 
 Pixels = NDArray[np.uint8]
 
@@ -15,13 +18,41 @@ DRAWN = 0.06
 """Share of crops that are drawn shapes: flat colours and sharp edges are rare in photographs."""
 
 
+TEST_PICTURES = Path(__file__).with_name("test_pictures.txt")
+"""Digests of the pictures that the codec is judged by, one a line: they never enter training."""
+
+
+def digest(picture: Pixels) -> str:
+    """SHA-256 of the shape and the samples of a picture [H, W, 3]."""
+    head = f"{picture.shape[1]}x{picture.shape[0]} ".encode()
+    return hashlib.sha256(head + np.ascontiguousarray(picture).tobytes()).hexdigest()
+
+
+def read(path: Path) -> Pixels | None:
+    """A picture file as RGB [H, W, 3], or None if it is none."""
+    picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    if picture is None:
+        return None
+    return np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), np.uint8)
+
+
 def load(folder: Path) -> list[Pixels]:
-    """All pictures of a folder as RGB [H, W, 3], in the order of their names."""
+    """All pictures of a folder as RGB [H, W, 3], in the order of their names.
+
+    Raises:
+        InputError: A test picture is among them, or there is no picture.
+    """
+    refused = set(TEST_PICTURES.read_text().split())
     found = []
     for path in sorted(folder.iterdir()):
-        picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
-        if picture is not None and min(picture.shape[:2]) >= SIZE:
-            found.append(np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), np.uint8))
+        picture = read(path)
+        if picture is None or min(picture.shape[:2]) < SIZE:
+            continue
+        if digest(picture) in refused:
+            raise InputError(f"{path}: this is a test picture; take it out of the folder")
+        found.append(picture)
+    if not found:
+        raise InputError(f"{folder}: no picture of at least {SIZE} pixels a side")
     return found
 
 
