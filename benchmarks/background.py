@@ -112,7 +112,10 @@ def run(
     for i, (path, (name, sprite)) in enumerate(pairs, first):
         photo, mixed, mask = composite(read_rgb(path), sprite, i)
         masks = [Region("object", mask)]
-        images = {v: encode(mixed, masks=masks, background=v, effort=effort) for v in OURS}
+        images = {
+            v: encode(mixed, masks=masks, background=v, effort=effort, texture="implicit")
+            for v in OURS
+        }
         for kind, image in images.items():
             sizes.setdefault(kind, []).append(len(image.to_bytes()))
         hole, filled = completions(images)

@@ -148,8 +148,8 @@ def meshes(data: Path) -> None:
             continue
         pixels, masks = regions(data, file.stem)
         picture = to_float(pixels)[0]
-        plan = plan_layers(picture, Settings(), masks)
-        for i, layer in enumerate(with_meshes(picture, plan, Settings()).layers):
+        plan = plan_layers(picture, Settings(texture="implicit"), masks)
+        for i, layer in enumerate(with_meshes(picture, plan, Settings(texture="implicit")).layers):
             if layer.mesh is not None and layer.boundary is not None:
                 chunk = pack(mesh_chunk.FIELDS, {"layer": i, **layer.mesh.fields})
                 rates.append(8 * Chunk(mesh_chunk.TYPE, chunk).size / (512 * 512))
@@ -172,7 +172,7 @@ def main() -> None:
         import tempfile
 
         pixels, masks = regions(args.data, PICTURE)
-        image = pxi.encode(pixels, masks=masks, effort=2)
+        image = pxi.encode(pixels, masks=masks, effort=2, texture="implicit")
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "picture.pxi"
             image.save(path)

@@ -56,7 +56,7 @@ def encoded(data: Path) -> Image:
     labels = read_rgb(data / "kodak_masks" / "kodim23.png")[..., 0]
     values = [v for v in np.unique(labels) if v]
     masks = [Region(n, labels == v) for n, v in zip(("red", "blue"), values, strict=True)]
-    return pxi.encode(pixels, masks=masks, quality=60)
+    return pxi.encode(pixels, masks=masks, quality=60, texture="implicit")
 
 
 def main() -> None:

@@ -128,12 +128,12 @@ def layer_figures(data: Path, quick: bool) -> None:
             part = region.mask[y : y + 512, x : x + 512]
             if part.any():
                 regions.append(type(region)(region.name, part))
-        layered = encode(crop, masks=regions, effort=4)
+        layered = encode(crop, masks=regions, effort=4, texture="implicit")
         size = len(layered.to_bytes())
         value = psnr_8bit(crop, layered.render()) or 99.0
         curve = []
         for quality in (44, 50, 56):
-            single = encode(crop, quality=quality, max_layers=1, effort=4)
+            single = encode(crop, quality=quality, max_layers=1, effort=4, texture="implicit")
             curve.append((len(single.to_bytes()), psnr_8bit(crop, single.render()) or 99.0))
         sizes, values = np.log([s for s, _ in curve]), [v for _, v in curve]
         slope, offset = np.polyfit(sizes, values, 1)
@@ -151,7 +151,7 @@ from proxyimg_codec.encoder.encode import encode
 pixels = read_rgb({path!r})
 pixels = centre_crop(pixels) if {crop} else pixels
 t = time.perf_counter()
-image = encode(pixels)
+image = encode(pixels, texture="implicit")
 n = pixels.shape[0] * pixels.shape[1]
 print(f"{{pixels.shape[1]}}x{{pixels.shape[0]}}: {{time.perf_counter() - t:.1f}} s wall, "
       f"{{len(image.to_bytes()) * 8 / n:.3f}} bpp", n)
@@ -199,7 +199,7 @@ def decode_figures(data: Path, quick: bool) -> None:
         for name, layers in (("one layer", 1), ("default layers", 4)):
             path = Path(folder) / "a.pxi"
             crop = centre_crop(read_rgb(data / "kodak/kodim23.png"))
-            encode(crop, max_layers=layers, effort=3).save(path)
+            encode(crop, max_layers=layers, effort=3, texture="implicit").save(path)
             for engine in ("numpy", "ort", "native"):
                 code = DECODE.format(path=str(path), engine=engine, runs=5, scale=1)
                 text, _, _ = run_limited(code, threads=1)

@@ -33,7 +33,7 @@ def main() -> None:
     masks, out = sys.argv[1:]
     photo = read_rgb(PHOTO)
     height, width = photo.shape[:2]
-    image = encode(photo, quality=60, masks=load_masks(masks, width, height))
+    image = encode(photo, quality=60, texture="implicit", masks=load_masks(masks, width, height))
     x, y, w, h = DETAIL
     bicubic = cv2.resize(photo[y : y + h, x : x + w], SIZE, interpolation=cv2.INTER_CUBIC)
     parts = [

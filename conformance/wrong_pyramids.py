@@ -144,7 +144,7 @@ _FAULTS: dict[str, list[Patch]] = {
     "ignores-support": [(planes, "support_at", _everywhere)],
     "context-not-mirrored": [(context, "_shifted", _clipped)],
     "context-high-mirrored-as-low": [(context, "_shifted", _low_everywhere)],
-    "synthesis-not-mirrored": [(synthesis, "_indices", lambda n, high:
+    "synthesis-not-mirrored": [(synthesis, "mirrored_indices", lambda n, high:
         np.clip(np.arange(-2, n + 2), 0, n - 1))],
     "ignores-shifts": [(LevelCoder, "__init__", _without_shifts)],
     "ignores-grey-levels": [(LevelCoder, "__init__", _all_colour)],

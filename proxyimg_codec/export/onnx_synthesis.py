@@ -11,7 +11,7 @@ from ..errors import UnsupportedError
 from ..texture import model
 from ..texture.network import Floats
 from ..texture.planes import Latents, Planes
-from ..texture.synthesis import BANDS, _indices, wavelet
+from ..texture.synthesis import BANDS, mirrored_indices, wavelet
 from .onnx_network import IR_VERSION, OPSET
 
 if TYPE_CHECKING:
@@ -148,7 +148,7 @@ def _extended(parts: _Parts, level: int, low: str, high: str, shape: tuple[int, 
 
     def mirrored(name: str, plane: str, ways: tuple[int, int]) -> str:
         for axis, side, n, way in zip((2, 3), ("rows", "columns"), shape, ways, strict=True):
-            index = parts.constant(f"{side}_{way}_{level}", _indices(n, bool(way)))
+            index = parts.constant(f"{side}_{way}_{level}", mirrored_indices(n, bool(way)))
             plane = parts.add("Gather", [plane, index], f"{name}_{side}_{level}", axis=axis)
         return plane
 

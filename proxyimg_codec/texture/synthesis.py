@@ -137,11 +137,11 @@ def _extended(low: Floats, latents: Ints, gain: Floats, top: int, bottom: int) -
 def _mirrored(
     planes: NDArray[Any], vertical: bool, horizontal: bool, top: int, bottom: int
 ) -> NDArray[Any]:
-    rows = _indices(planes.shape[0], vertical)[top : bottom + 4]
-    return planes[rows[:, None], _indices(planes.shape[1], horizontal)]
+    rows = mirrored_indices(planes.shape[0], vertical)[top : bottom + 4]
+    return planes[rows[:, None], mirrored_indices(planes.shape[1], horizontal)]
 
 
-def _indices(n: int, high: bool) -> NDArray[np.int64]:
+def mirrored_indices(n: int, high: bool) -> NDArray[np.int64]:
     """-2..n+1 mirrored: low bands about the first sample and behind the last, high reversed."""
     index = np.arange(-2, n + 2)
     index = np.where(index < 0, -index - int(high), index)
