@@ -320,7 +320,7 @@ def test_results_are_not_replaced(tool, two, tmp_path, fake_codecs):
 def test_qualities_of_the_table_are_ones_that_the_codecs_know():
     for codec in peers.codecs().values():
         assert [codec.checked(q) for q in codec.qualities] == list(codec.qualities)
-        assert 6 <= len(codec.qualities) <= 8
+        assert 5 <= len(codec.qualities) <= 8
 
 
 @pytest.mark.parametrize("name", ["webp", "jp2", "jxl", "avif420", "avif444"])
