@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxyimg_codec import pictures
+from proxyimg_codec.bench.rd import machine
 
 Pixels = NDArray[Any]
 
@@ -29,18 +30,6 @@ def header(data: Path) -> str:
             parts.append(f"{name} absent")
     parts += [f"Python {platform.python_version()}", f"data {data.resolve().name}", machine()]
     return "; ".join(parts)
-
-
-def machine() -> str:
-    """Processor and cores."""
-    import os
-
-    model = platform.processor() or platform.machine()
-    info = Path("/proc/cpuinfo")
-    if info.exists():
-        names = [v for v in info.read_text().splitlines() if v.startswith("model name")]
-        model = names[0].split(":")[1].strip() if names else model
-    return f"{model}, {os.cpu_count()} cores"
 
 
 def kodak(data: Path) -> list[Path]:

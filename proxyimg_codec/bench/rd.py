@@ -158,7 +158,7 @@ def run(tasks: Sequence[Task], jobs: int, finished: Callable[[Row | Failure], No
             try:
                 for future in as_completed([pool.submit(measure, t) for t in tasks]):
                     finished(future.result())
-            except BaseException:
+            except BaseException:  # Ctrl-C too must leave no worker behind
                 pool.shutdown(wait=False, cancel_futures=True)
                 for process in multiprocessing.active_children():
                     process.terminate()

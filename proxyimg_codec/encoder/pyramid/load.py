@@ -50,7 +50,7 @@ def load(number: int) -> Model:
         state |= {k: torch.from_numpy(v.astype(np.float32)) for k, v in analysis.items()}
     model.load_state_dict(state)
     model.requires_grad_(False)
-    model.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+    model.to(memory_format=torch.channels_last)  # type: ignore[call-overload]  # not in torch's stubs
     return model
 
 

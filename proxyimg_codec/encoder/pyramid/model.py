@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor, nn
@@ -34,19 +34,19 @@ class _Through(torch.autograd.Function):
     """Rounds to multiples of a step within bounds; the gradient passes inside the bounds."""
 
     @staticmethod
-    def forward(ctx, x, step, low, high):  # type: ignore[no-untyped-def]
+    def forward(ctx: Any, x: Tensor, step: float, low: float, high: float) -> Tensor:
         ctx.save_for_backward((x >= low * step) & (x <= high * step))
         return (x * (1 / step)).round_().clamp_(low, high).mul_(step)
 
     @staticmethod
-    def backward(ctx, grad):  # type: ignore[no-untyped-def]
+    def backward(ctx: Any, grad: Tensor) -> tuple[Tensor, None, None, None]:
         (inside,) = ctx.saved_tensors
         return grad * inside, None, None, None
 
 
 def through(x: Tensor, step: float, low: float, high: float) -> Tensor:
     """`x` rounded to multiples of `step` from low * step to high * step, straight through."""
-    rounded: Tensor = _Through.apply(x, step, low, high)  # type: ignore[no-untyped-call]
+    rounded: Tensor = _Through.apply(x, step, low, high)  # type: ignore[no-untyped-call]  # torch's stubs
     return rounded
 
 
@@ -89,13 +89,14 @@ class Model(nn.Module):
 
     def level(self, number: int) -> Level:
         """Weights of a level, 1 = finest."""
-        return self.levels[min(number, SHARED_FROM) - 1]  # type: ignore[return-value]
+        return self.levels[min(number, SHARED_FROM) - 1]  # type: ignore[return-value]  # torch's stubs
 
     def set_mode(self, *, integer: bool | None = None, fast: bool | None = None) -> None:
         """Sets `integer` or `fast` of every level."""
         for level in self.levels:
-            level.integer = level.integer if integer is None else integer  # type: ignore
-            level.fast = level.fast if fast is None else fast  # type: ignore
+            assert isinstance(level, Level)
+            level.integer = level.integer if integer is None else integer
+            level.fast = level.fast if fast is None else fast
 
     def analyse(self, picture: Tensor, step: Tensor, levels: int = LEVELS) -> list[Tensor]:
         """Latents of pictures [B, 3, H, W] in 0..255: levels 1.. [B, 9, h, w], and the lowest."""
@@ -298,7 +299,7 @@ class Residual(nn.Module):
         self.second = nn.Conv2d(hidden, hidden, 1)
         self.third = nn.Conv2d(hidden, outputs, 3)
         nn.init.zeros_(self.third.weight)
-        nn.init.zeros_(self.third.bias)  # type: ignore[arg-type]
+        nn.init.zeros_(self.third.bias)  # type: ignore[arg-type]  # torch's stubs
 
     def forward(self, x: Tensor, q: Tensor, fast: bool, quantized: bool = False) -> Tensor:
         """Outputs for inputs [B, C, h, w]; `quantized` simulates 8-bit weights."""

@@ -67,7 +67,7 @@ def _tails(distance: Tensor, rate: Tensor) -> tuple[Tensor, Tensor]:
 def bits(values: Tensor, mean: Tensor, log_scale: Tensor) -> Tensor:
     """Bits of latents; between integers, the line that joins the bits of both neighbours."""
     low = torch.floor(values.detach())
-    pair: tuple[Tensor, Tensor] = _Bits.apply(low - mean, log_scale)  # type: ignore[no-untyped-call]
+    pair: tuple[Tensor, Tensor] = _Bits.apply(low - mean, log_scale)  # type: ignore[no-untyped-call]  # torch's stubs
     return pair[0] + (values - low) * (pair[1] - pair[0])
 
 
@@ -78,7 +78,7 @@ class _Smooth(torch.autograd.Function):
     def forward(ctx: Any, offset: Tensor, log_scale: Tensor) -> Tensor:
         with torch.enable_grad():
             o, s = offset.detach().requires_grad_(), log_scale.detach().requires_grad_()
-            out: Tensor = _Bits.apply(o, s)[0]  # type: ignore[no-untyped-call]
+            out: Tensor = _Bits.apply(o, s)[0]  # type: ignore[no-untyped-call]  # torch's stubs
             ctx.save_for_backward(*torch.autograd.grad(out.sum(), (o, s)))
         return out.detach()
 
@@ -92,7 +92,7 @@ class _Smooth(torch.autograd.Function):
 
 def bits_of_integers(values: Tensor, mean: Tensor, log_scale: Tensor) -> Tensor:
     """Bits of integer latents; the gradient by `values` is that of the smooth density."""
-    found: Tensor = _Smooth.apply(values - mean, log_scale)  # type: ignore[no-untyped-call]
+    found: Tensor = _Smooth.apply(values - mean, log_scale)  # type: ignore[no-untyped-call]  # torch's stubs
     return found
 
 

@@ -153,7 +153,7 @@ def refined(
         own.param_groups[0]["lr"] = RATE * annealed(share)
         chosen = held(relaxed(latents, temperature(share)), fixed, target)
         own.zero_grad(set_to_none=True)
-        cost(model, target, chosen).total.backward()  # type: ignore[no-untyped-call]
+        cost(model, target, chosen).total.backward()  # type: ignore[no-untyped-call]  # torch's stubs
         own.step()
         tick()
     return held([y.detach() for y in latents], fixed, target)
