@@ -173,8 +173,8 @@ class _Job:
         margin = -(-reach // unit) * unit
         return [
             Window.of((top, left), side, margin, (rows, columns))
-            for top in _starts(rows, side)
-            for left in _starts(columns, side)
+            for top in range(0, rows, side)
+            for left in range(0, columns, side)
         ]
 
     def refine(self, box: Window, effort: Effort, seed: int, tick: Callable[[int], None]) -> None:
@@ -312,10 +312,6 @@ class Window(NamedTuple):
         out[:, :, i, j.start :] = True
         out[:, :, i.stop :] = True
         return out
-
-
-def _starts(length: int, side: int) -> list[int]:
-    return list(range(0, length, side))
 
 
 def _tensor(values: NDArray[np.floating]) -> Tensor:
