@@ -16,10 +16,13 @@ from numpy.typing import NDArray
 
 from .. import kernel
 from ..errors import FormatError
-from .rans import SCALE_BITS, Decoder, Encoder, lanes_log2_for
+from .rans import SCALE_BITS, Decoder, Encoder
 
 MODEL_BITS = 4
 """Bits of a value that the adaptive model codes; lower ones are raw."""
+
+LANE_BITS = 1 << 12
+"""Bits a lane: few, as a group is many array operations here."""
 
 COUNT_START, COUNT_STEP, COUNT_LIMIT = 8, 32, 1 << 14
 """Adaptation: initial count of a symbol, its increment, and the sum at which a row is halved."""
@@ -95,7 +98,7 @@ def encode(values: NDArray[np.integer], bits: int, stored: NDArray[np.bool_]) ->
     model = _Model(channels, 1 << high)
     known = np.full((height + 1, width + 2, channels), -1, np.int16)
     top = np.moveaxis(values.astype(np.int64) >> low, 0, -1)
-    encoder = Encoder(lanes_log2_for(int(stored.sum()) * channels))
+    encoder = Encoder(lane_bits=LANE_BITS)
     ys, xs, bounds = _wavefronts(stored)
     for a, b in pairwise(bounds):
         y, x = ys[a:b], xs[a:b]

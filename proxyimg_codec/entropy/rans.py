@@ -24,15 +24,13 @@ LOW = 1 << 16
 
 MAX_LANES_LOG2 = 10
 
+LANE_BITS = 1 << 14
+"""Bits that are worth another lane, which costs some 24 bits."""
+
 TOO_SHORT = "entropy-coded stream ends too early"
 
 _SLOT_MASK = np.uint64((1 << SCALE_BITS) - 1)
 _SCALE_SHIFT, _WORD_SHIFT, _LOW = np.uint64(SCALE_BITS), np.uint64(16), np.uint64(LOW)
-
-
-def lanes_log2_for(symbols: int) -> int:
-    """Lanes an encoder uses: enough for array speed, few enough to cost about 1 %."""
-    return min(max((symbols // 512).bit_length() - 1, 0), MAX_LANES_LOG2)
 
 
 @functools.lru_cache(maxsize=64)
@@ -43,9 +41,9 @@ def _row_starts(count: int, width: int) -> NDArray[np.int64]:
 class Encoder:
     """Collects (start, frequency) pairs in decoding order; `finish` returns the stream."""
 
-    def __init__(self, lanes_log2: int | None = None) -> None:
-        """A stream with 2**lanes_log2 states; None = as many as its size is worth."""
-        self._lanes_log2 = lanes_log2
+    def __init__(self, lanes_log2: int | None = None, lane_bits: int = LANE_BITS) -> None:
+        """A stream with 2**lanes_log2 states; None = at most one for every `lane_bits` bits."""
+        self._lanes_log2, self._lane_bits = lanes_log2, lane_bits
         self._starts: list[NDArray[np.uint16]] = []
         self._freqs: list[NDArray[np.uint16]] = []
         self._ends: list[NDArray[np.int64]] = []
@@ -75,7 +73,8 @@ class Encoder:
         """The stream: u8 lanes_log2, u32 states, u32 number of words, u16 words."""
         lanes_log2 = self._lanes_log2
         if lanes_log2 is None:
-            lanes_log2 = min(max((int(self.bits()) // 4096).bit_length() - 1, 0), MAX_LANES_LOG2)
+            worth = int(self.bits()) // self._lane_bits
+            lanes_log2 = min(max(worth.bit_length() - 1, 0), MAX_LANES_LOG2)
         start = np.concatenate([np.zeros(0, np.uint16), *self._starts])
         freq = np.concatenate([np.zeros(0, np.uint16), *self._freqs])
         ends = np.concatenate([np.zeros(0, np.int64), *self._ends])

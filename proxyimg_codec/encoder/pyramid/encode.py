@@ -16,7 +16,7 @@ from ...texture.planes import Latents, Planes
 from . import refine
 from .load import load
 from .model import LEVELS, LOG_SCALES, Model
-from .rate import around
+from .rate import bits_at
 
 NUMBER = 1
 """The registered model that is used."""
@@ -45,8 +45,8 @@ class Effort(NamedTuple):
 
 
 EFFORTS = (
-    Effort(0, 1), Effort(0, 2), Effort(0, 6), Effort(0, 15), Effort(0, 30), Effort(0, 60),
-    Effort(0, 120), Effort(50, 150), Effort(300, 200),
+    Effort(0, 1), Effort(0, 2), Effort(0, 6), Effort(0, 15), Effort(0, 45), Effort(0, 80),
+    Effort(0, 140), Effort(50, 150), Effort(300, 200),
 )  # fmt: skip
 """At effort 1..9."""
 
@@ -231,27 +231,51 @@ class _Job:
     @torch.no_grad()
     def _shifts(self) -> tuple[int, ...]:
         """The shifts of the scale index that take the fewest bits for the present latents."""
-        found = [torch.round(y) for y in self.latents]
-        spent = np.zeros((len(SHIFTS), self.count, 2))
+        samples: list[list[_Sample]] = [[] for _ in range(2 * self.count)]
+        few = slice(None, None, SPARSE)
         for box in self.windows():
             own = [
-                y[:, :, (a := box.at(level))[0], a[1]]
-                for y, level in zip(found, self._depths(), strict=True)
+                torch.round(y[:, :, (a := box.at(level))[0], a[1]])
+                for y, level in zip(self.latents, self._depths(), strict=True)
             ]
-            likely = self.model.likelihoods(own, self.step)
-            few = slice(None, None, SPARSE)
-            for k, (y, p) in enumerate(zip(own, likely, strict=False)):
-                y, mean, scale = (v[:, :, few, few] for v in (y, *p))
-                mask = None
+            for k, p in enumerate(self.model.likelihoods(own, self.step)):
+                y, mean, scale = (v[:, :, few, few] for v in (own[k], *p))
+                mask = torch.ones(1, 9, 1, 1)
                 if self.support is not None:
                     a = box.at(k + 1)
                     mask = self.support[k][:, :, a[0], a[1]][:, :, few, few]
-                for n, shift in enumerate(SHIFTS):
-                    bits = around(y, mean, (scale + shift / 8).clamp(*LOG_SCALES)).here
-                    bits = bits if mask is None else bits * mask
-                    spent[n, k] += float(bits[:, :3].sum()), float(bits[:, 3:].sum())
-        spent += 1e-3 * np.abs(np.array(SHIFTS))[:, None, None]  # none, where nothing tells
-        return tuple(SHIFTS[i] for i in spent.argmin(0).ravel())
+                for group, at in enumerate((slice(3), slice(3, 9))):
+                    part = _Sample(y[:, at] - mean[:, at], scale[:, at], mask[:, at])
+                    samples[2 * k + group].append(part)
+        return tuple(_best_shift(part) for part in samples)
+
+
+class _Sample(NamedTuple):
+    """Some latents less their mean, the log of their scale, and which of them are coded."""
+
+    offset: Tensor
+    log_scale: Tensor
+    mask: Tensor
+
+    def bits(self, shift: int) -> float:
+        """Bits with a shift of the scale index."""
+        scale = (self.log_scale + shift / 8).clamp(*LOG_SCALES)
+        return float((bits_at(self.offset, scale) * self.mask).sum())
+
+
+def _best_shift(samples: list[_Sample]) -> int:
+    """The shift that takes the fewest bits, found downhill from none."""
+    spent: dict[int, float] = {}
+
+    def cost(shift: int) -> float:
+        if shift not in spent:
+            spent[shift] = sum(part.bits(shift) for part in samples) + 1e-3 * abs(shift)
+        return spent[shift]
+
+    best = 0
+    while (near := min((best - 1, best, best + 1), key=cost)) != best and near in SHIFTS:
+        best = near
+    return best
 
 
 class Window(NamedTuple):

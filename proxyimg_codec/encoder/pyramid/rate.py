@@ -96,6 +96,15 @@ def bits_of_integers(values: Tensor, mean: Tensor, log_scale: Tensor) -> Tensor:
     return found
 
 
+@torch.no_grad()
+def bits_at(offset: Tensor, log_scale: Tensor) -> Tensor:
+    """Bits of integers that lie `offset` from their mean; no gradient."""
+    distance, rate = offset.abs(), torch.exp(-log_scale)
+    inner, outer = (sum(_tails((distance + by).abs(), rate)) for by in (-0.5, 0.5))
+    inner = torch.where(distance < 0.5, 1 - inner, inner)
+    return -torch.log2((inner - outer).clamp_min(_LEAST))
+
+
 class Around(NamedTuple):
     """Bits of integers and of their neighbours.
 

@@ -184,7 +184,8 @@ def improved(
     least = math.inf
     for turn in range(rounds + 1):
         ys = [y.clone().requires_grad_(True) for y in now]
-        spent = cost(model, target, ys, smooth=False)
+        with torch.set_grad_enabled(turn < rounds):
+            spent = cost(model, target, ys, smooth=False)
         total = spent.total
         if total.item() < least:
             least, best = total.item(), now

@@ -10,7 +10,7 @@ import torch
 from proxyimg_codec import from_bytes
 from proxyimg_codec.encoder.encode import encode
 from proxyimg_codec.encoder.pyramid import encode as pyramid
-from proxyimg_codec.encoder.pyramid import refine
+from proxyimg_codec.encoder.pyramid import rate, refine
 from proxyimg_codec.encoder.pyramid.encode import Effort, Raster, Window
 from proxyimg_codec.encoder.pyramid.load import load
 from proxyimg_codec.encoder.settings import Settings
@@ -126,6 +126,23 @@ def test_refinement_lowers_the_cost():
     assert costs(greedy) < 0.97 * costs(start)
     assert costs(both) < costs(annealed)
     assert all((y == torch.round(y)).all() for y in greedy)
+
+
+def test_shifts_take_the_fewest_bits():
+    job = pyramid._Job(load(1), Raster(textured(96, 96, 3).astype(np.float32)), 256)
+    best = job._shifts()
+    likely = job.model.likelihoods([torch.round(y) for y in job.latents], job.step)
+    few = slice(None, None, pyramid.SPARSE)
+    for k, (y, p) in enumerate(zip(job.latents, likely, strict=False)):
+        for group, at in enumerate((slice(3), slice(3, 9))):
+            y_, mean, scale = (v[:, at, few, few] for v in (torch.round(y), *p))
+            spent = {
+                s: rate.bits_of_integers(y_, mean, (scale + s / 8).clamp(-4, 3.875)).sum().item()
+                for s in pyramid.SHIFTS
+            }
+            chosen = best[2 * k + group]
+            for near in {chosen - 1, chosen + 1} & set(pyramid.SHIFTS):
+                assert spent[chosen] <= spent[near] + 0.01
 
 
 def test_relaxed_latents_lie_between_their_neighbours():

@@ -169,6 +169,7 @@ def test_around_is_bits_at_neighbours():
     def at(move):
         return rate.bits_of_integers(values + move, mean, scale)
 
+    torch.testing.assert_close(rate.bits_at(values - mean, scale), at(0), atol=1e-4, rtol=1e-4)
     found = rate.around(values, mean, scale)
     for ours, move in ((found.here, 0), (found.below, -1), (found.above, 1)):
         torch.testing.assert_close(ours, at(move), atol=1e-4, rtol=1e-4)
