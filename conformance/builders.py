@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
+import msgpack
 import numpy as np
 from numpy.typing import NDArray
 
-from proxyimg_codec.container.chunks import Chunk
+from proxyimg_codec.container.chunks import VERSION, Chunk, read, write
+from proxyimg_codec.container.fields import unpack
+from proxyimg_codec.container.file import fields_of
 from proxyimg_codec.geometry.boundary import Boundary
 from proxyimg_codec.geometry.mesh import Base, Mesh
 from proxyimg_codec.geometry.pose import REST, Pose
@@ -222,3 +226,33 @@ def on_back(n: Numbers, *layers: Layer, channels: int = 3) -> Image:
     back = layer("back", (0, 0, *SIZE), texture(n))
     net = network(n, channels=channels, contrast=0.6 if channels == 3 else 1.5)
     return picture(SIZE, [back, *layers], net, opaque=channels == 3)
+
+
+def values(chunk: Chunk) -> dict[str, Any]:
+    """The values of a chunk by key."""
+    return unpack(fields_of(chunk), chunk.payload, "")
+
+
+def changed(chunk: Chunk, new: Mapping[str, Any], *, in_map: bool = False) -> Chunk:
+    """A chunk with other, added or (if None) removed values, right or wrong.
+
+    Args:
+        chunk: What it is made from.
+        new: The changes, by key.
+        in_map: Whether it holds a map, as versions 0.1 and 0.2 wrote it.
+    """
+    content = {k: v for k, v in (values(chunk) | dict(new)).items() if v is not None}
+    return replace(chunk, payload=msgpack.packb(content if in_map else list(content.values())))
+
+
+def with_maps(
+    data: bytes, version: tuple[int, int] = VERSION, without: Sequence[str] = ()
+) -> bytes:
+    """A file of another version, with maps in all chunks but those of the types `without`."""
+    return write(
+        [
+            changed(c, {}, in_map=True) if fields_of(c) and c.type not in without else c
+            for c in read(data)
+        ],
+        version,
+    )

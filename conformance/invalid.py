@@ -14,7 +14,7 @@ from proxyimg_codec.container.chunks import Chunk, read, write
 from proxyimg_codec.entropy import arrays
 from proxyimg_codec.image import Image
 
-from .builders import Numbers, ellipse, layer, network, picture, texture
+from .builders import Numbers, changed, ellipse, layer, network, picture, texture, values
 
 HEAD, BACK, DISC, NETW, BACK_TEXR, DISC_TEXR, TAIL = range(7)
 """Positions of the chunks in the base file."""
@@ -39,9 +39,8 @@ class Base:
         return picture((12, 10), [back, disc], network(n))
 
     def fields(self, at: int) -> dict[str, Any]:
-        """The map of chunk number `at`."""
-        values: dict[str, Any] = msgpack.unpackb(self.chunks[at].payload)
-        return values
+        """The values of chunk number `at` by key."""
+        return values(self.chunks[at])
 
     def order(self, *positions: int) -> bytes:
         """The chunks at `positions`."""
@@ -53,10 +52,13 @@ class Base:
         chunks[at] = replace(chunks[at], payload=payload)
         return write(chunks)
 
-    def set(self, at: int, **values: Any) -> bytes:
-        """Chunk `at` with other, added or (if None) removed fields."""
-        fields = {k: v for k, v in (self.fields(at) | values).items() if v is not None}
-        return self.payload(at, msgpack.packb(fields, use_bin_type=True))
+    def set(self, at: int, **new: Any) -> bytes:
+        """Chunk `at` with other, added or (if None) removed values."""
+        return self.payload(at, changed(self.chunks[at], new).payload)
+
+    def map(self, at: int, **new: Any) -> bytes:
+        """The same with a map."""
+        return self.payload(at, changed(self.chunks[at], new, in_map=True).payload)
 
     def edit(self, at: int, key: str, change: Callable[[bytes], bytes]) -> bytes:
         """Chunk `at` with the bytes of one field changed."""
@@ -100,6 +102,11 @@ def _half(value: float) -> bytes:
     return struct.pack("<e", value)
 
 
+def _long(chunk: Chunk) -> bytes:
+    """The payload with its last value, a small integer, in two bytes."""
+    return chunk.payload[:-1] + b"\xcc" + chunk.payload[-1:]
+
+
 def _deep(b: Base) -> bytes:
     return b.payload(HEAD, b"\x91" * 50_000 + b"\x00")
 
@@ -131,7 +138,7 @@ _FRAMING: list[_Row] = [
     ("invalid-length", "a chunk's length has its top bit set", "chunk: length",
      lambda b: put(b.data, 12 + 7, lambda v: v | 128)),
     ("invalid-crc-head", "the width's last bit flipped", "chunk: CRC",
-     lambda b: b.damage(HEAD, b.chunks[HEAD].payload.index(b"size") + 5, 1)),
+     lambda b: b.damage(HEAD, 2, 1)),
     ("invalid-crc-texture", "the last code's last bit flipped", "chunk: CRC",
      lambda b: b.damage(BACK_TEXR, -1, 128)),
     ("invalid-crc-tail", "a bit of TAIL's CRC flipped", "chunk: CRC",
@@ -183,15 +190,33 @@ _STRUCTURE: list[_Row] = [
     ("invalid-box", "an empty box", "range", lambda b: b.set(DISC, box=[2, 2, 8, 0])),
     ("invalid-grid", "a plane of one column", "range", lambda b: b.set(BACK_TEXR, grid=[1, 5])),
     ("invalid-bits", "codes of nine bits", "range", lambda b: b.set(BACK_TEXR, bits=9)),
-    ("invalid-key-order", "two keys change places", "canonical form",
-     lambda b: b.payload(TAIL - 1, msgpack.packb(dict(reversed(b.fields(DISC_TEXR).items()))))),
-    ("invalid-key-missing", "a key is missing", "fields", lambda b: b.set(HEAD, depth=None)),
-    ("invalid-key-unknown", "a key too many", "fields", lambda b: b.set(HEAD, more=1)),
+    ("invalid-value-missing", "a value is missing", "fields", lambda b: b.set(HEAD, depth=None)),
+    ("invalid-value-last", "the last value is missing", "fields",
+     lambda b: b.set(DISC_TEXR, codes=None)),
+    ("invalid-value-more", "a value too many", "fields", lambda b: b.set(HEAD, more=1)),
+    ("invalid-value-order", "the values in the opposite order", "fields",
+     lambda b: b.payload(DISC_TEXR, msgpack.packb([*b.fields(DISC_TEXR).values()][::-1]))),
+    ("invalid-key-order", "a map in the opposite order", "canonical form: maps",
+     lambda b: b.payload(HEAD, msgpack.packb(dict(reversed(b.fields(HEAD).items()))))),
+    ("invalid-key-order-texture", "a map in the opposite order, the coder last",
+     "canonical form: maps",
+     lambda b: b.payload(DISC_TEXR, msgpack.packb(dict(reversed(b.fields(DISC_TEXR).items()))))),
+    ("invalid-key-missing", "a map without one of the keys", "fields: maps",
+     lambda b: b.map(HEAD, depth=None)),
+    ("invalid-key-unknown", "a map with a key too many", "fields: maps",
+     lambda b: b.map(HEAD, more=1)),
+    ("invalid-no-array", "a payload that is an integer", "fields",
+     lambda b: b.payload(HEAD, b"\x07")),
+    ("invalid-long-array", "a payload with three bytes of header for one", "canonical form",
+     lambda b: b.payload(HEAD, b"\xdc\x00" + put(b.chunks[HEAD].payload, 0, lambda v: v & 15))),
     ("invalid-long-integer", "an integer in two bytes for one", "canonical form",
-     lambda b: b.payload(HEAD, b.chunks[HEAD].payload.replace(b"depth\x08", b"depth\xcc\x08"))),
+     lambda b: b.payload(HEAD, _long(b.chunks[HEAD]))),
+    ("invalid-long-integer-map", "an integer in two bytes for one, in a map",
+     "canonical form: maps",
+     lambda b: b.payload(HEAD, _long(changed(b.chunks[HEAD], {}, in_map=True)))),
     ("invalid-float", "a float for an integer", "fields", lambda b: b.set(HEAD, depth=8.0)),
     ("invalid-boolean", "true for 1", "fields", lambda b: b.set(HEAD, opaque=True)),
-    ("invalid-payload-end", "a byte after the map", "canonical form",
+    ("invalid-payload-end", "a byte after the array", "canonical form",
      lambda b: b.payload(HEAD, b.chunks[HEAD].payload + b"\0")),
     ("invalid-nesting", "arrays nested 50,000 deep", "canonical form", _deep),
     ("unsupported-sampling", "a sampling of the future", "registry",

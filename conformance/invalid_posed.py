@@ -17,7 +17,18 @@ from proxyimg_codec.geometry.pose import Pose, encode
 from proxyimg_codec.image import Image
 
 from .bent import UNIT
-from .builders import Numbers, bend, ellipse, grid_mesh, layer, network, picture, polygon, texture
+from .builders import (
+    Numbers,
+    bend,
+    changed,
+    ellipse,
+    grid_mesh,
+    layer,
+    network,
+    picture,
+    polygon,
+    texture,
+)  # fmt: skip
 from .invalid import Base, Invalid, put
 
 (HEAD, BACK, DISC, COPY, DISC_MESH, COPY_MESH, POSE, NETW, BACK_TEXR, DISC_TEXR, COPY_TEXR,
@@ -51,10 +62,9 @@ class Posed(Base):
     def sets(self, **values: dict[str, Any]) -> bytes:
         """Several chunks with other fields, by the names of their positions."""
         chunks = list(self.chunks)
-        for name, fields in values.items():
+        for name, new in values.items():
             at = globals()[name]
-            packed = msgpack.packb(self.fields(at) | fields, use_bin_type=True)
-            chunks[at] = replace(chunks[at], payload=packed)
+            chunks[at] = changed(chunks[at], new)
         return write(chunks)
 
     def tiny(
@@ -109,14 +119,13 @@ def _flags(values: Sequence[int]) -> bytes:
 
 
 def _shared(b: Posed, at: int, texture: int) -> bytes:
-    return b.payload(at, msgpack.packb({"coder": 0, "texture": texture}))
+    return b.payload(at, msgpack.packb([0, texture]))
 
 
 def _chain(b: Posed) -> bytes:
     chunks = list(b.chunks)
     for at, number in ((DISC_TEXR, 0), (COPY_TEXR, 1)):
-        payload = msgpack.packb({"coder": 0, "texture": number})
-        chunks[at] = replace(chunks[at], payload=payload)
+        chunks[at] = replace(chunks[at], payload=msgpack.packb([0, number]))
     return write(chunks)
 
 
@@ -161,7 +170,7 @@ _STRUCTURE: list[_Row] = [
     ("invalid-shared-later", "a texture that is shared with a later layer", "texture: shared",
      lambda b: _shared(b, BACK_TEXR, 1)),
     ("invalid-shared-chain", "a shared texture that is shared itself", "texture: shared", _chain),
-    ("invalid-shared-keys", "a shared texture with the keys of an implicit one", "fields",
+    ("invalid-shared-values", "a shared texture with the values of an implicit one", "fields",
      lambda b: b.set(DISC_TEXR, coder=0)),
     ("invalid-shared-sampling", "a texture that is shared with other features", "texture: shared",
      lambda b: b.set(COPY, sampling=1)),
@@ -177,8 +186,10 @@ _STRUCTURE: list[_Row] = [
      lambda b: b.set(POSE, **_AT | {"layer": 0, "opacity": 65534})),
     ("invalid-opaque-hidden", "opaque with a hidden back layer", "opaque",
      lambda b: b.set(POSE, **_AT | {"layer": 0, "hidden": 1})),
-    ("unsupported-coder-keys", "a texture coder of the future, with other keys", "registry",
-     lambda b: b.payload(DISC_TEXR, msgpack.packb({"coder": 77, "more": 1}))),
+    ("unsupported-coder-values", "a texture coder of the future, with other values", "registry",
+     lambda b: b.payload(DISC_TEXR, msgpack.packb([200, "more"]))),
+    ("unsupported-coder-keys", "a texture coder of the future in a map, with other keys",
+     "registry", lambda b: b.payload(DISC_TEXR, msgpack.packb({"coder": 77, "more": 1}))),
     ("limit-gates", "a mesh of a million gates", "limits",
      lambda b: b.set(DISC_MESH, gates=1 << 20)),
     ("limit-faces", "a mesh of a quarter of a million faces", "limits",

@@ -15,7 +15,7 @@ from proxyimg_codec.image import Image
 from proxyimg_codec.texture import planes
 from proxyimg_codec.texture.planes import Latents
 
-from .builders import SIZE, Numbers, ellipse, layer, picture
+from .builders import SIZE, Numbers, changed, ellipse, layer, picture
 from .invalid import Base, Invalid, put, words
 from .pyramids import coded, view
 
@@ -136,7 +136,7 @@ def _carved(b: Base) -> bytes:
     """A layer of 2^26 samples that 33 others cut."""
     side, others = 1 << 13, range(1, 34)
     box, part = [0, 0, side, side], {"part": [0, 0, side, side], "cuts": list(others)}
-    shared = replace(b.chunks[DISC_TEXR], payload=msgpack.packb({"coder": 0, "texture": 0}))
+    shared = replace(b.chunks[DISC_TEXR], payload=msgpack.packb([0, 0]))
     return write([
         _changed(b, HEAD, layers=34),
         _changed(b, BACK, box=box),
@@ -157,8 +157,8 @@ def _large_mask(b: Base) -> bytes:
 
 
 def _changed(b: Base, at: int, **values: Any) -> Chunk:
-    """Chunk `at` with other fields."""
-    return replace(b.chunks[at], payload=msgpack.packb(b.fields(at) | values))
+    """Chunk `at` with other values."""
+    return changed(b.chunks[at], values)
 
 
 _Row = tuple[str, str, str, Callable[[Base], bytes]]
@@ -277,7 +277,7 @@ _VIEWS: list[_Row] = [
      lambda b: b.edit(DISC_TEXR, "mask", lambda v: v[:-1])),
     ("invalid-view-sampling", "a view at the nodes of a mesh", "sampling: node",
      lambda b: b.set(DISC, sampling=3)),
-    ("invalid-view-keys", "a view with the coder of an implicit texture", "fields",
+    ("invalid-view-values", "a view with the coder of an implicit texture", "fields",
      lambda b: b.set(DISC_TEXR, coder=1)),
     ("invalid-cuts-mask", "a mask and cuts", "pyramid: cuts", lambda b: b.set(
         DISC_TEXR, cuts=[1])),

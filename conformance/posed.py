@@ -26,6 +26,7 @@ from .builders import (
     picture,
     polygon,
     texture,
+    with_maps,
 )  # fmt: skip
 from .registry import WHOLE, Valid, Valids
 
@@ -205,12 +206,22 @@ def _undo_stale(n: Numbers) -> bytes:
     return _with(layered(n).to_bytes(), _history(bytes(32), b"rubbish", 7))
 
 
-@_case("A file of version 0.1", "file: version")
+@_case("A file of version 0.1, of maps", "file: version", "fields: maps")
 def _version_0_1(n: Numbers) -> bytes:
-    return write(read(layered(n).to_bytes()), (0, 1))
+    return with_maps(layered(n).to_bytes(), (0, 1))
 
 
-@_case("A file of version 0.2, with a mesh and a pose", "file: version")
+@_case("A file of version 0.2, of maps, with a mesh and a pose", "file: version", "fields: maps")
 def _version_0_2(n: Numbers) -> bytes:
     mesh = grid_mesh((2, 1), 5, 4)
-    return write(read(on_back(n, disc(n, mesh, nodes=bend(n, mesh))).to_bytes()), (0, 2))
+    return with_maps(on_back(n, disc(n, mesh, nodes=bend(n, mesh))).to_bytes(), (0, 2))
+
+
+@_case("A file of version 0.3 with maps, but arrays in the layers", "fields: maps")
+def _maps(n: Numbers) -> bytes:
+    return with_maps(layered(n).to_bytes(), without=["LAYR"])
+
+
+@_case("A file of version 0.2 with arrays", "file: version", "fields: maps")
+def _arrays_0_2(n: Numbers) -> bytes:
+    return write(read(layered(n).to_bytes()), (0, 2))

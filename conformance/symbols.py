@@ -18,7 +18,7 @@ def digest(data: bytes) -> str:
     Raises:
         PxiError: The file is corrupt.
     """
-    planes = from_bytes(data)._planes()
+    planes = from_bytes(data).planes
     hashed = hashlib.sha256()
     for levels, lowest in (source.latents for source in planes):
         for values in (lowest, *reversed(levels)):

@@ -81,7 +81,30 @@ def _lenient_fields(declared: tuple[fields.Field, ...], payload: bytes, where: s
     except FormatError as error:
         if "canonical" not in str(error):
             raise
-        return msgpack.unpackb(payload)
+        return fields_of(declared, msgpack.packb(msgpack.unpackb(payload)), where)
+
+
+def _ignoring_more(declared: tuple[fields.Field, ...], payload: bytes, where: str) -> Any:
+    try:
+        return fields_of(declared, payload, where)
+    except FormatError as error:
+        if " values instead of " not in str(error):
+            raise
+        first = msgpack.unpackb(payload)[: len(declared)]
+        return fields_of(declared, msgpack.packb(first), where)
+
+
+def _sorting_keys(declared: tuple[fields.Field, ...], payload: bytes, where: str) -> Any:
+    content = msgpack.unpackb(payload)
+    if isinstance(content, dict) and content.keys() == {f.key for f in declared}:
+        payload = msgpack.packb([content[f.key] for f in declared])
+    return fields_of(declared, payload, where)
+
+
+def _refusing_maps(declared: tuple[fields.Field, ...], payload: bytes, where: str) -> Any:
+    if payload[:1] < b"\x90":
+        raise FormatError("not an array", where)
+    return fields_of(declared, payload, where)
 
 
 def _hanging(*_: Any) -> int:
@@ -151,6 +174,9 @@ FAULTS: dict[str, list[Patch]] = {
     "accepts-any-step": [(implicit, "read_halves", _lenient_halves),
         (network, "read_halves", _lenient_halves)],
     "accepts-any-encoding": [(file, "unpack", _lenient_fields)],
+    "accepts-more-values": [(file, "unpack", _ignoring_more)],
+    "accepts-any-order-of-keys": [(file, "unpack", _sorting_keys)],
+    "refuses-maps": [(file, "unpack", _refusing_maps)],
     **FAULTS_OF_POSES,
     **FAULTS_OF_PYRAMIDS,
     "exit-code-1": [(decode, "main", _crashing)],

@@ -140,8 +140,8 @@ def _all_direct(*args: Any) -> file.Container:
     return replace(c, layers=tuple(layers))
 
 
-def _following_parents(*args: Any) -> image.Image:
-    made = from_bytes_of(*args)
+def _following_parents(*args: Any, **options: Any) -> image.Image:
+    made = from_bytes_of(*args, **options)
     above = {v.name: v for v in made.layers}
     moved = [
         replace(v, pose=replace(v.pose, shift=above[v.parent].pose.shift))
@@ -176,7 +176,7 @@ FAULTS: dict[str, list[Patch]] = {
     "no-closing": [(mesh, "_close", lambda triangles, origin, *_: (triangles, origin))],
     "children-turned": [(mesh, "refine", _centre_first)],
     "ranks-by-number": [(mesh._Border, "ranked", _by_number)],
-    "midpoints-not-predicted": [(pose, "_values", _values_of_neighbours)],
+    "midpoints-not-predicted": [(pose, "restored", _values_of_neighbours)],
     "last-face-wins": [(warp, "rasterize", _last_face)],
     "turned-faces-win": [(warp, "rasterize", _both_sides)],
     "mirrored-faces-swap": [(Pose, "mirrored", False)],

@@ -10,10 +10,11 @@ import numpy as np
 
 from proxyimg_codec import kernel
 from proxyimg_codec.entropy import laplace
+from proxyimg_codec.geometry.pose import Pose
 from proxyimg_codec.render import compose
 from proxyimg_codec.texture import context, cuts, model, planes, pyramid, synthesis
 from proxyimg_codec.texture.context import LevelCoder
-from proxyimg_codec.texture.cuts import Cuts
+from proxyimg_codec.texture.cuts import GONE, NOTHING, Apart, Cuts
 from proxyimg_codec.texture.pyramid import PyramidTexture
 
 from .wrong_poses import Patch
@@ -102,8 +103,8 @@ def _nearest(points: Any, start: int, extent: int, samples: int) -> Any:
     return np.minimum(before + (f >= 0.5), samples - 1), 0 * f
 
 
-def _straight(self: PyramidTexture, row: Any, column: Any) -> Any:
-    values = samples_of(self, row, column)
+def _straight(self: PyramidTexture, *where: Any) -> Any:
+    values = samples_of(self, *where)
     if self.alpha is not None:
         values[:, :3] /= np.maximum(values[:, 3:], 1e-6)
     return values
@@ -129,10 +130,30 @@ def _opaque(*args: Any) -> PyramidTexture:
     return found if found.alpha is None else replace(found, alpha=None)
 
 
+def _unmixed(self: Cuts) -> Any:
+    found = self._left(self.everything)
+    return found if found.any() else ~found
+
+
+def _all_bare(*args: Any) -> Apart:
+    found = apart_of(*args)
+    return found._replace(behind=GONE) if found.behind else found
+
+
+def _back_bares(*args: Any) -> Apart:
+    found = apart_of(*args)
+    return found._replace(behind=tuple((b, s) for b, s in found.behind if not s))
+
+
+def _only_where(self: Pose, other: Pose) -> bool:
+    return (self.matrix, self.shift) == (other.matrix, other.shift)
+
+
 support_of, shifted_of, level_of = planes.support_at, context._shifted, LevelCoder.__init__
 wave_of, escape_of = LevelCoder._wave, planes._Decoder._escape
 position_of, samples_of = pyramid._position, PyramidTexture._samples
 unpack_of, premultiplied_of = pyramid.unpack, compose.premultiplied
+apart_of = Cuts.apart
 
 _FAULTS: dict[str, list[Patch]] = {
     "causal-off-by-one": [(context, "CAUSAL", (*model.CAUSAL[:-1], (-1, 3)))],
@@ -165,8 +186,13 @@ _FAULTS: dict[str, list[Patch]] = {
     "ignores-mask": [(PyramidTexture, "shown", None)],
     "fills-black": [(pyramid, "diffused", _black)],
     "ignores-cuts": [(Cuts, "of", lambda *a: None)],
-    "cuts-mixed-samples": [(Cuts, "shown", property(lambda self: self._left(mixed=False)))],
+    "cuts-mixed-samples": [(Cuts, "shown", property(_unmixed))],
     "trusts-mixed-samples": [(Cuts, "trusted", property(lambda self: self.shown))],
+    "keeps-rims": [(Cuts, "apart", lambda *a: NOTHING)],
+    "keeps-rims-of-its-own": [(Cuts, "apart", lambda *a: apart_of(*a)._replace(behind=()))],
+    "keeps-rims-of-what-is-not-drawn": [(Pose, "still", _only_where)],
+    "loses-rims-everywhere": [(Cuts, "apart", _all_bare)],
+    "loses-rims-of-what-moves-together": [(Cuts, "apart", _back_bares)],
     "trusts-samples-near": [(cuts, "REACH", 1)],
 }  # fmt: skip
 

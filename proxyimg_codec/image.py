@@ -2,41 +2,42 @@
 
 from __future__ import annotations
 
+import logging
 import os
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from . import salvage
 from .container import file as container
-from .container import texr
 from .container.check import check
 from .container.chunks import Chunk, write
-from .container.fields import pack
 from .container.undo import Step
 from .editable import Editable
 from .errors import PxiError, UsageError
 from .files import read_bytes, write_atomically
-from .geometry import boundary as boundaries
-from .geometry import pose as posing
 from .geometry import warp
 from .geometry.boundary import Boundary
 from .geometry.mesh import Mesh
 from .geometry.pose import REST, Pose
+from .geometry.track import Timeline, Track
 from .limits import DEFAULT_LIMITS, Limits
 from .render.cache import Cache
 from .render.compose import render
 from .render.view import make_view
-from .texture import implicit, network, planes, pyramid
-from .texture.cuts import Cuts
-from .texture.implicit import Box, ImplicitTexture
+from .texture.cuts import NOTHING, Apart
+from .texture.implicit import Box
 from .texture.network import Network
 from .texture.planes import Planes
 from .texture.pyramid import PyramidTexture, Texture
+
+if TYPE_CHECKING:
+    from .animate.motion import Motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +53,7 @@ class Layer(Editable):
         sampling: How features are found: 0 direct, 1 to 3 at the proxy nodes.
         pose: What edits have done to it.
         parent: Name of the layer or group that it follows, or None.
+        track: How its nodes move over the timeline of the image, or None.
         image: The image it belongs to.
     """
 
@@ -63,6 +65,7 @@ class Layer(Editable):
     sampling: int = 0
     pose: Pose = REST
     parent: str | None = None
+    track: Track | None = None
     image: Image | None = field(default=None, repr=False)
 
     @property
@@ -78,6 +81,14 @@ class Layer(Editable):
         assert self.image is not None, "a layer of no image has no canvas"
         size = (self.image.width, self.image.height)
         return warp.outline(self.boundary, self.pose, self.mesh, size)
+
+    @cached_property
+    def apart(self) -> Apart:
+        """What no longer lies to the layer as it did when the samples of its view were mixed."""
+        assert self.image is not None, "a layer of no image has none beside it"
+        layers = self.image.layers
+        home = next(k for k, v in enumerate(layers) if v.texture is self.texture)
+        return _apart(self.texture, self.pose, layers, home)
 
 
 class Layers(Sequence[Layer]):
@@ -110,6 +121,18 @@ class Layers(Sequence[Layer]):
         raise UsageError(f"there is no layer {key!r}; the picture has {names}")
 
 
+def _apart(view: Texture, pose: Pose, layers: Sequence[Layer], home: int) -> Apart:
+    """What is apart from a view, cut for layer `home`, that a layer in a pose shows."""
+    if not isinstance(view, PyramidTexture) or view.cuts is None:
+        return NOTHING
+    boundaries = [v.boundary for v in layers]
+    still = [v.pose.still(pose) for v in layers]
+    raster = [
+        isinstance(v.texture, PyramidTexture) and v.texture.planes is view.planes for v in layers
+    ]
+    return view.cuts.apart(home, boundaries, still, raster)
+
+
 def _settled(layers: Sequence[Layer]) -> list[Layer]:
     """Layers whose views have a mask where a boundary that cuts them is not in its place."""
     boundaries = [layer.boundary for layer in layers]
@@ -123,9 +146,9 @@ def _settled(layers: Sequence[Layer]) -> list[Layer]:
             sharing = (k for k, v in enumerate(layers) if v.texture is view)
             home = next((k for k in sharing if layers[k].box == view.cuts.box), None)
             if home is None:
-                shown[view] = view.masked()
+                shown[view] = view.masked(view.cuts.everything)
             elif home > i or view.cuts.numbers(i, boundaries) is None:
-                shown[view] = view.masked(boundaries[home], boundaries[home + 1 :])
+                shown[view] = view.masked(_apart(view, layers[home].pose, layers, home))
     return [replace(layer, texture=shown[layer.texture]) for layer in layers]
 
 
@@ -145,7 +168,9 @@ class Image:
         info: Encoder, settings and areas, as in the iNFO chunk, or None.
         extra: Unknown ancillary chunks, carried along.
         groups: Parent of each group of layers, a name or None, by the group's name.
+        timeline: When layers that have a track move, or None.
         history: The edits that led here, oldest first, each with the state before it.
+        damage: What was wrong with the file it was read from, where that was tolerated.
         cache: Colours that were computed, shared with the images made from this one.
     """
 
@@ -160,7 +185,9 @@ class Image:
     info: Mapping[str, Any] | None = None
     extra: tuple[Chunk, ...] = ()
     groups: Mapping[str, str | None] = field(default_factory=dict)
+    timeline: Timeline | None = None
     history: tuple[Step, ...] = ()
+    damage: tuple[str, ...] = ()
     cache: Cache = field(default_factory=Cache, repr=False)
 
     def __post_init__(self) -> None:
@@ -207,9 +234,48 @@ class Image:
         """
         return replace(self, history=())
 
+    def at(self, t: float) -> Image:
+        """The still that the picture is at a time in seconds; without a timeline, itself.
+
+        Before and after its timeline a picture stays as it is at its ends, unless it loops.
+
+        Raises:
+            UsageError: The time is not a number.
+        """
+        if self.timeline is None:
+            return self
+        moved = [
+            layer
+            if layer.track is None
+            else replace(
+                layer,
+                pose=replace(layer.pose, sway=layer.track.at(self.timeline, t)),
+                track=None,
+            )
+            for layer in self.layers
+        ]
+        return replace(self, layers=Layers(moved), timeline=None, history=())
+
+    def animated(
+        self, motion: Motion, *, progress: Callable[[int, int], None] | None = None
+    ) -> Image:
+        """The picture with another motion, simulated and stored.
+
+        Args:
+            motion: What moves, and how: `animate.motion`.
+            progress: Called with the number of simulated frames and of all frames to simulate.
+
+        Raises:
+            UsageError: The motion does not fit the picture.
+        """
+        from .animate.animate import animate
+
+        return animate(self, motion, progress)
+
     def render(
         self,
         *,
+        t: float | None = None,
         width: int | None = None,
         height: int | None = None,
         scale: float | None = None,
@@ -224,6 +290,7 @@ class Image:
         """Renders the picture, or part of it, at any size.
 
         Args:
+            t: Time in seconds, of a picture that moves; by default the still is drawn.
             width: Output columns; with `height` left out, the aspect is kept.
             height: Output rows.
             scale: Output pixels a canvas pixel, instead of width and height.
@@ -244,6 +311,12 @@ class Image:
             UnsupportedError: The engine is not installed.
             LimitError: The output is too large.
         """
+        if t is not None:
+            return self.at(t).render(
+                width=width, height=height, scale=scale, region=region, layers=layers,
+                background=background, dtype=dtype, engine=engine, limits=limits,
+                progress=progress,
+            )  # fmt: skip
         try:
             dtype = np.dtype(dtype)
         except TypeError:
@@ -285,89 +358,24 @@ class Image:
         Raises:
             LimitError: It is larger than readers accept by default.
         """
-        content = self._container()
+        from .packing import pack
+
+        content = pack(self)
         check(content, DEFAULT_LIMITS)
         return container.serialize(content)
 
     @cached_property
     def chunks(self) -> tuple[Chunk, ...]:
         """The chunks of its file but uNDO and TAIL."""
-        return tuple(container.present(self._container()))
+        from .packing import pack
 
-    def _container(self) -> container.Container:
-        meshes = [(i, v.mesh) for i, v in enumerate(self.layers) if v.mesh is not None]
-        poses = [(i, v) for i, v in enumerate(self.layers) if not v.pose.at_rest]
-        return container.Container(
-            {
-                "size": [self.width, self.height],
-                "channels": self.channels,
-                "opaque": int(self.opaque),
-                "depth": self.depth,
-                "layers": len(self.layers),
-                "networks": len(self.networks),
-            },
-            tuple(
-                {
-                    "name": v.name,
-                    "box": list(v.box),
-                    "sampling": v.sampling,
-                    **boundaries.encode(v.boundary),
-                }
-                for v in self.layers
-            ),
-            tuple(n.packed for n in self.networks),
-            self._textures(),
-            tuple(p.packed for p in self._planes()),
-            tuple({"layer": i, **m.fields} for i, m in meshes),
-            tuple({"layer": i, **posing.encode(v.pose, v.mesh)} for i, v in poses),
-            self._tree(),
-            self.history,
-            self.blocks,
-            self.info,
-            self.extra,
-        )
+        return tuple(container.present(pack(self)))
 
-    def _planes(self) -> list[Planes]:
+    @property
+    def planes(self) -> list[Planes]:
         """The planes that textures show, in the order of their first use."""
         views = (v.texture for v in self.layers if isinstance(v.texture, PyramidTexture))
         return list(dict.fromkeys(source for view in views for source in view.sources))
-
-    def _textures(self) -> tuple[Mapping[str, Any], ...]:
-        """Fields of each TEXR; what is equal to an earlier one refers to it."""
-        first: dict[Hashable, int] = {}
-        numbers = {p: k for k, p in enumerate(self._planes())}
-        out: list[Mapping[str, Any]] = []
-        for i, layer in enumerate(self.layers):
-            at = first.get(layer.texture)
-            if at is None:
-                fields, meaning = self._texture(i, numbers)
-                key = (pack(texr.CODERS[fields["coder"]], fields), meaning)
-                at = first[layer.texture] = first.setdefault(key, i)
-            out.append(fields if at == i else {"coder": texr.SHARED, "texture": at})
-        return tuple(out)
-
-    def _texture(
-        self, number: int, planes: Mapping[Planes, int]
-    ) -> tuple[Mapping[str, Any], Hashable]:
-        """Fields of a layer's TEXR, and what else they depend on for their meaning."""
-        shown = self.layers[number].texture
-        if isinstance(shown, ImplicitTexture):
-            return shown.packed, None
-        if shown.cuts is None:
-            return shown.fields(planes), None
-        cuts = shown.cuts.numbers(number, [v.boundary for v in self.layers])
-        assert cuts is not None, "views whose cuts are gone have a mask"
-        return shown.fields(planes, cuts), (shown.cuts.box, number in cuts)
-
-    def _tree(self) -> dict[str, Any] | None:
-        above = [layer.parent for layer in self.layers] + list(self.groups.values())
-        if not self.groups and not any(above):
-            return None
-        number = {n: i + 1 for i, n in enumerate([*(v.name for v in self.layers), *self.groups])}
-        return {
-            "groups": list(self.groups),
-            "parents": [0 if name is None else number[name] for name in above],
-        }
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the picture to `path`, replacing it in one step.
@@ -389,64 +397,36 @@ def _finish(tile: NDArray[np.float32], solid: bool, dtype: np.dtype[Any]) -> NDA
     return tile[..., :3] if solid else tile
 
 
-def from_bytes(data: bytes, limits: Limits = DEFAULT_LIMITS) -> Image:
+def from_bytes(data: bytes, limits: Limits = DEFAULT_LIMITS, *, tolerant: bool = False) -> Image:
     """Decodes a `.pxi` file held in memory.
 
+    Args:
+        data: The file.
+        limits: Bounds what is spent on it.
+        tolerant: Whether to make do with what can be decoded of a file that is cut off or damaged.
+            What is wrong is logged as a warning, and stands in `Image.damage`.
+
     Raises:
-        FormatError: The file breaks the format.
+        FormatError: The file breaks the format; or, if `tolerant`, too little of it is left.
         UnsupportedError: It needs a newer reader.
         LimitError: It exceeds `limits`.
     """
-    c = container.parse(data, limits)
-    networks = tuple(network.unpack(v, f"chunk NETW {i}") for i, v in enumerate(c.networks))
-    meshes = {
-        v["layer"]: Mesh({k: w for k, w in v.items() if k != "layer"}, f"chunk MESH {i}", limits)
-        for i, v in enumerate(c.meshes)
-    }
-    poses = {
-        v["layer"]: posing.decode(v, meshes.get(v["layer"]), f"chunk POSE {i}")
-        for i, v in enumerate(c.poses)
-    }
-    groups = c.tree["groups"] if c.tree else []
-    nodes = [None, *(v["name"] for v in c.layers), *groups]
-    parents = [nodes[k] for k in c.tree["parents"]] if c.tree else [None] * len(c.layers)
-    sources = [planes.unpack(v, f"chunk PLAN {i}") for i, v in enumerate(c.planes)]
-    outlines = [boundaries.decode(v, f"chunk LAYR {i}") for i, v in enumerate(c.layers)]
-    boxes = [(v["box"][0], v["box"][1], v["box"][2], v["box"][3]) for v in c.layers]
-    textures: list[Texture] = []
-    for i, (v, t) in enumerate(zip(c.layers, c.textures, strict=True)):
-        if t["coder"] == texr.SHARED:
-            textures.append(textures[t["texture"]])
-        elif t["coder"] == texr.PYRAMID:
-            cuts = Cuts.of(t["cuts"], i, outlines, boxes[i])
-            textures.append(pyramid.unpack(t, sources, f"chunk TEXR {i}", cuts))
-        else:
-            textures.append(implicit.unpack(t, networks, f"chunk TEXR {i}", v["sampling"]))
-    layers = [
-        Layer(
-            v["name"],
-            box,
-            outline,
-            texture,
-            meshes.get(i),
-            v["sampling"],
-            poses.get(i, REST),
-            parent,
-        )
-        for i, (v, box, outline, texture, parent) in enumerate(
-            zip(c.layers, boxes, outlines, textures, parents[: len(c.layers)], strict=True)
-        )
-    ]
-    width, height = c.head["size"]
-    return Image(
-        width, height, c.head["channels"], bool(c.head["opaque"]), c.head["depth"],
-        Layers(layers), networks, c.blocks, c.info, c.extra,
-        dict(zip(groups, parents[len(c.layers) :], strict=True)), c.history,
-    )  # fmt: skip
+    damage: tuple[str, ...] = ()
+    if tolerant:
+        c, damage = salvage.parse(data, limits)
+        if damage:
+            logging.getLogger(__name__).warning("the file is damaged: %s", "; ".join(damage))
+    else:
+        c = container.parse(data, limits)
+    from .packing import unpack
+
+    return unpack(c, limits, damage)
 
 
-def open_image(path: str | os.PathLike[str], limits: Limits = DEFAULT_LIMITS) -> Image:
-    """Reads a `.pxi` file.
+def open_image(
+    path: str | os.PathLike[str], limits: Limits = DEFAULT_LIMITS, *, tolerant: bool = False
+) -> Image:
+    """Reads a `.pxi` file; see `from_bytes`.
 
     Raises:
         InputError: The file cannot be read.
@@ -454,7 +434,7 @@ def open_image(path: str | os.PathLike[str], limits: Limits = DEFAULT_LIMITS) ->
     """
     data = read_bytes(path)
     try:
-        return from_bytes(data, limits)
+        return from_bytes(data, limits, tolerant=tolerant)
     except PxiError as error:
         error.args = (f"{os.fspath(path)}: {error}",)
         raise

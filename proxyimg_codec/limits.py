@@ -27,7 +27,8 @@ class Limits:
         samples: Raster samples of all planes together.
         filled: Raster samples of all parts that are shown with a mask or cuts, which may have to be
             filled.
-        covered: Raster samples of all parts that boundaries cut, once for each of these.
+        covered: Raster samples of all parts that boundaries cut, once for each of these, and for
+            each layer behind one that cuts itself.
         wavefronts: Columns plus twice the rows of a plane of codes or a mask, or plus thrice the
             rows of a raster: steps of its decoding.
         parameters: Parameters of all networks together.

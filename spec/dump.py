@@ -5,13 +5,15 @@ from __future__ import annotations
 import argparse
 import struct
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import msgpack
 import numpy as np
 
-from proxyimg_codec.container import chunks, meta, tree, undo
+from proxyimg_codec.container import chunks
+from proxyimg_codec.container.fields import unpack
+from proxyimg_codec.container.file import fields_of
 from proxyimg_codec.errors import PxiError
 from proxyimg_codec.files import read_bytes
 from proxyimg_codec.geometry import coverage as cover
@@ -31,11 +33,6 @@ LINE = 16
 
 LINES = 16
 """Lines of one piece that are shown; the rest is counted."""
-
-MAPS = (
-    *("HEAD", "LAYR", "MESH", "POSE", "NETW", "PLAN", "TEXR"),
-    *(*meta.BLOCKS.values(), meta.INFO_TYPE, tree.TYPE, undo.TYPE),
-)
 
 
 def coded_array(data: bytes) -> Iterator[Piece]:
@@ -98,25 +95,41 @@ BINARY: dict[str, Callable[[bytes], Iterator[Piece]]] = {
 """What is inside the binary fields."""
 
 
-def map_pieces(payload: bytes) -> Iterator[Piece]:
-    """Pieces of a MessagePack map of bytes, strings, integers and arrays of integers."""
+def valid(chunk: chunks.Chunk) -> bool:
+    """Whether a chunk is a structured one and has the values that it must have."""
+    try:
+        fields = fields_of(chunk)
+        unpack(fields, chunk.payload, "")
+    except PxiError:
+        return False
+    return bool(fields)
+
+
+def structured(payload: bytes, keys: Sequence[str]) -> Iterator[Piece]:
+    """Pieces of a MessagePack array of values that are called `keys`, or of a map."""
     unpacker = msgpack.Unpacker()
     unpacker.feed(payload)
-    count = unpacker.read_map_header()
+    in_map = payload[0] < 0x90
+    count = unpacker.read_map_header() if in_map else unpacker.read_array_header()
     at = unpacker.tell()
-    yield at, f"map of {count} entries"
-    for _ in range(count):
-        key, start = unpacker.unpack(), at
-        at = unpacker.tell()
-        yield at - start, f"key {key!r}"
+    yield at, f"map of {count} entries" if in_map else f"array of {count} values"
+    for i in range(count):
+        if in_map:
+            key, start = unpacker.unpack(), at
+            at = unpacker.tell()
+            yield at - start, f"key {key!r}"
+            label = "  "
+        else:
+            key = keys[i]
+            label = f"{key}: "
         value, start = unpacker.unpack(), at
         at = unpacker.tell()
         if isinstance(value, bytes):
-            yield at - start - len(value), f"{len(value)} bytes"
+            yield at - start - len(value), f"{label}{len(value)} bytes"
             if value:
                 yield from BINARY[key](value)
         else:
-            yield at - start, f"  {value!r}"
+            yield at - start, f"{label}{value!r}"
 
 
 def pieces(data: bytes) -> Iterator[Piece]:
@@ -133,8 +146,8 @@ def pieces(data: bytes) -> Iterator[Piece]:
         yield 0, ""
         yield 4, f"chunk {chunk.type}"
         yield 4, f"payload of {len(chunk.payload)} bytes"
-        if chunk.type in MAPS:
-            yield from map_pieces(chunk.payload)
+        if valid(chunk):
+            yield from structured(chunk.payload, [f.key for f in fields_of(chunk)])
         elif chunk.payload:
             yield len(chunk.payload), "payload"
         yield 4, "CRC-32"
@@ -241,7 +254,7 @@ def values(image: Image) -> Iterator[str]:
         for k, weights in enumerate(network.weights):
             yield f"network {i}, weights of linear layer {k}"
             yield from grid(weights)
-    for i, planes in enumerate(image._planes()):
+    for i, planes in enumerate(image.planes):
         yield from planes_values(i, planes)
     shown: dict[Texture, str] = {}
     for layer in image.layers:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from proxyimg_codec.container import head, layr, mesh, meta, netw, plan, pose, texr, tree, undo
+from proxyimg_codec.container import head, layr, mesh, meta, motn, netw, plan, pose, texr, tree, undo
 from proxyimg_codec.container.fields import Field
 from proxyimg_codec.entropy import arrays
 from proxyimg_codec.geometry import deltas
@@ -40,8 +40,12 @@ FIELDS = {
     "BLOCK": meta.FIELDS,
     "iNFO": meta.INFO_FIELDS,
     "tREE": tree.FIELDS,
+    "mOTN": motn.FIELDS,
     "uNDO": undo.FIELDS,
 }
+
+KEYS = ("HEAD", "LAYR", "MESH", "POSE", "NETW", "PLAN")
+"""Chunks that the program of the chapters reads, besides TEXR."""
 
 SMALL = np.array([[[20, 21, 22, 0], [20, 21, 20, 23]]])
 SMALL_STORED = np.array([[True, True, True, False], [True, True, True, True]])
@@ -81,6 +85,18 @@ def fields_table(fields: tuple[Field, ...]) -> Iterator[str]:
             "strs": "array of any number of strings",
         }[f.kind]
         yield f"| `{f.key}` | {kind} | {number(f.low)} .. {number(f.high)} | {f.meaning} |"
+
+
+def keys_table() -> Iterator[str]:
+    """The keys of the chunks that the program of the chapters reads, as Python."""
+    yield "KEYS = {"
+    for kind in KEYS:
+        yield f'    "{kind}": "{" ".join(f.key for f in FIELDS[kind])}",'
+    yield '    "TEXR": ('
+    for _, fields in sorted(texr.CODERS.items()):
+        yield f'        "{" ".join(f.key for f in fields)}",'
+    yield "    ),"
+    yield "}"
 
 
 def small_example() -> Iterator[str]:
@@ -156,6 +172,7 @@ def fenced(lines: Iterator[str], language: str = "text") -> Iterator[str]:
 
 PARTS: dict[str, Callable[[], Iterator[str]]] = {
     **{f"fields {k}": functools.partial(fields_table, v) for k, v in FIELDS.items()},
+    "keys": lambda: fenced(keys_table(), "python"),
     "example": lambda: fenced(small_example()),
     "mesh": lambda: fenced(mesh_example()),
     "mesh steps": mesh_steps,

@@ -31,7 +31,8 @@ ROOT = Path(__file__).parents[1]
 SPEC = ROOT / "spec"
 NUMBERED = sorted(SPEC.glob("[0-9]*.md"), key=lambda p: int(p.name.partition("-")[0]))
 CHAPTERS = {p.name: p.read_text("utf-8") for p in (SPEC / "README.md", *NUMBERED)}
-IDS = dict(enumerate(("CON", "CHK", "ENT", "GEO", "TEX", "REN", "MET", "SEC", "", "MSH", "PYR"), 1))
+PREFIXES = ("CON", "CHK", "ENT", "GEO", "TEX", "REN", "MET", "SEC", "", "MSH", "PYR", "MOT")
+IDS = dict(enumerate(PREFIXES, 1))
 PARTS = re.findall(r"^<!-- ((?!end )[^\n]+) -->$", "".join(CHAPTERS.values()), re.M)
 
 
@@ -506,7 +507,7 @@ def test_dump_covers_every_byte(small_pxi, example, capsys):
     posed = [
         c.input.read_bytes()
         for c in CASES
-        if c.name in ("closing-deep", "shared", "undo", "pyramid-cells", "pyramid-escapes")
+        if c.name in ("closing-deep", "shared", "undo", "pyramid-cells", "pyramid-escapes", "maps")
     ]
     for data in (small_pxi.read_bytes(), example, *posed):
         assert sum(size for size, _ in dump.pieces(data)) == len(data)
@@ -515,6 +516,25 @@ def test_dump_covers_every_byte(small_pxi, example, capsys):
     shown = re.findall(r"^\w{6}  ((?:[\da-f]{2} ?)+)", "\n".join(dump.dump(example)), re.M)
     assert bytes.fromhex("".join(shown)) == example
     assert dump.main([str(SPEC / "README.md")]) == FormatError.exit_code
+
+
+@pytest.mark.parametrize("name", ["invalid-value-more", "invalid-key-order", "unsupported-coder"])
+def test_dump_passes_over_payloads_that_are_not_right(name):
+    dump = tool("dump")
+    data = {c.name: c for c in load()}[name].input.read_bytes()
+    found = list(dump.pieces(data))
+    assert sum(size for size, _ in found) == len(data)
+    assert [meaning for _, meaning in found].count("payload") == 1
+
+
+def test_dump_names_values_in_arrays_and_keys_in_maps():
+    dump = tool("dump")
+    data = {c.name: c.input.read_bytes() for c in CASES}["maps"]
+    lines = [meaning for _, meaning in dump.pieces(data)]
+    at = lines.index("chunk HEAD")
+    assert lines[at + 2 : at + 5] == ["map of 6 entries", "key 'size'", "  [32, 24]"]
+    at = lines.index("chunk LAYR")
+    assert lines[at + 2 : at + 5] == ["array of 7 values", "name: 'back'", "box: [0, 0, 32, 24]"]
 
 
 def test_dump_prints_meshes_and_poses():

@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import os
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from ..errors import UsageError
-from .common import Bar, check_target, default_target, parser, run
+from .common import EXIT_CODES, Bar, check_target, default_target, parser, run
 
 LAYERED = (".ora", ".svg")
 """Suffixes of files that hold layers, not one picture."""
+
+DAMAGED = 7
+"""Exit code if a damaged file was decoded as far as it goes."""
 
 
 def arguments() -> argparse.ArgumentParser:
     """The command line."""
     p = parser("pxi-decode", "Render a .pxi file at any size and region.")
+    p.epilog = f"{EXIT_CODES}  {DAMAGED} damaged, but decoded as far as it goes (--tolerant)\n"
     p.add_argument("input", metavar="IN", help=".pxi file, or - for standard input")
     p.add_argument("output", metavar="OUT", nargs="?", help="picture file, type by suffix; "
                    ".ora writes the layers, .svg their outlines; - writes PNG to standard output; "
@@ -34,6 +40,8 @@ def arguments() -> argparse.ArgumentParser:
         "8 by default")  # fmt: skip
     add("--engine", choices=["auto", "numpy", "native", "ort"], default="auto",
         help="who runs the networks; auto is the fastest that is built in")  # fmt: skip
+    add("--tolerant", action="store_true", help="of a file that is cut off or damaged, make the "
+        "picture from the levels that can be decoded, say so, and exit with 7")  # fmt: skip
     add("--export-onnx", metavar="FILE", help="write the decoder network as ONNX; of a pyramid "
         "texture the synthesis of its colours")  # fmt: skip
     add("-f", "--force", action="store_true", help="replace files that exist")
@@ -44,11 +52,19 @@ def arguments() -> argparse.ArgumentParser:
 def main(argv: list[str] | None = None) -> int:
     """Entry point; returns the exit code."""
     args = arguments().parse_args(argv)
-    return run("pxi-decode", lambda: decode_file(args))
+    damage: list[str] = []
+    log, handler = logging.getLogger("proxyimg_codec"), logging.StreamHandler()
+    handler.setFormatter(logging.Formatter("pxi-decode: warning: %(message)s"))
+    log.addHandler(handler)
+    try:
+        code = run("pxi-decode", lambda: damage.extend(decode_file(args)))
+    finally:
+        log.removeHandler(handler)
+    return code or (DAMAGED if damage else 0)
 
 
-def decode_file(args: argparse.Namespace) -> None:
-    """Does what the command line asks for."""
+def decode_file(args: argparse.Namespace) -> Sequence[str]:
+    """Does what the command line asks for; what was wrong with the input."""
     rendering = args.output is not None or args.export_onnx is None
     output = target(args) if rendering else ""
     kind = Path(output).suffix.lower()
@@ -65,7 +81,7 @@ def decode_file(args: argparse.Namespace) -> None:
     from ..image import open_image
 
     started = time.perf_counter()
-    image = open_image(args.input)
+    image = open_image(args.input, tolerant=args.tolerant)
     if args.export_onnx is not None:
         export(image, args)
     if rendering:
@@ -75,6 +91,8 @@ def decode_file(args: argparse.Namespace) -> None:
             render(image, output, args)
         if not args.quiet:
             print(f"{output}: {time.perf_counter() - started:.2f} s", file=sys.stderr)
+    damage: Sequence[str] = image.damage
+    return damage
 
 
 def refuse_render_flags(args: argparse.Namespace) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from ..errors import FormatError, UnsupportedError
@@ -39,9 +40,27 @@ def check(c: Container, limits: Limits) -> None:
     limits.check("gates", sum(values["gates"] for values in c.meshes))
     _check_layers(c)
     _check_tree(c)
+    _check_motion(c, limits)
     _check_networks(c, limits)
     _check_planes(c, limits)
     _check_textures(c, limits)
+
+
+def _check_motion(c: Container, limits: Limits) -> None:
+    """Checks mOTN."""
+    if c.motion is None:
+        return
+    numbers, meshed = c.motion["layers"], {values["layer"] for values in c.meshes}
+    if not numbers or any(b <= a for a, b in pairwise(numbers)):
+        raise FormatError("the layers that move are none or not ascending", "chunk mOTN")
+    for number in numbers:
+        if number not in meshed:
+            raise FormatError(f"layer {number} moves, but has no mesh", "chunk mOTN")
+    if c.head["opaque"] and numbers[0] == 0:
+        raise FormatError("the back layer of an opaque file moves", "chunk mOTN")
+    if bool(c.motion["size"]) != bool(c.motion["script"]):
+        raise FormatError("the script and its size do not fit", "chunk mOTN")
+    limits.check("metadata_bytes", c.motion["size"])
 
 
 def _check_networks(c: Container, limits: Limits) -> None:
@@ -101,7 +120,8 @@ def _check_textures(c: Container, limits: Limits) -> None:
             _check_cuts(c, i)
             area = own["part"][2] * own["part"][3]
             filled += area if own["mask"] or own["cuts"] else 0
-            covered += area * len(own["cuts"])
+            # A layer that cuts itself may also lose what those behind it touch.
+            covered += area * (len(own["cuts"]) + (i if i in own["cuts"] else 0))
             if not own["mask"]:
                 continue
         rows, columns = texr.mask_shape(own) if pyramid else own["grid"][::-1]

@@ -117,3 +117,36 @@ def read(data: bytes, limits: Limits = DEFAULT_LIMITS) -> list[Chunk]:
     if not chunks or chunks[-1].type != "TAIL":
         raise FormatError("truncated: the TAIL chunk is missing", offset=at)
     return chunks
+
+
+def read_damaged(
+    data: bytes, limits: Limits = DEFAULT_LIMITS
+) -> tuple[list[Chunk], dict[int, bool]]:
+    """The chunks of a file that may be cut off or damaged, as far as chunks can be told.
+
+    Returns:
+        The chunks, and the places in this list of those that are not right, with whether one is
+        cut off. Otherwise it fails its CRC.
+
+    Raises:
+        FormatError: Not the beginning of a .pxi file.
+        UnsupportedError: Another format version.
+        LimitError: Too large or too many chunks.
+    """
+    limits.check("file_bytes", len(data))
+    _check_prefix(data)
+    chunks: list[Chunk] = []
+    wrong: dict[int, bool] = {}
+    at = PREFIX.size
+    while len(data) - at >= FRAME.size and not (chunks and chunks[-1].type == "TAIL"):
+        limits.check("chunks", len(chunks) + 1)
+        raw, length = FRAME.unpack_from(data, at)
+        if not _valid_type(raw):
+            break
+        end = at + FRAME.size + length
+        crc = int.from_bytes(data[end : end + 4], "little")
+        if end + 4 > len(data) or zlib.crc32(data[at:end]) != crc:
+            wrong[len(chunks)] = end + 4 > len(data)
+        chunks.append(Chunk(raw.decode(), data[at + FRAME.size : end], at))
+        at = end + 4
+    return chunks, wrong

@@ -1,8 +1,9 @@
-"""Declared fields of structured chunks, packed as one canonical msgpack map.
+"""Declared fields of structured chunks, packed as one canonical msgpack array.
 
-Canonical: keys in the declared order, shortest encodings, no floats, no extension types. A reader
-re-packs what it read and compares, so that every content has exactly one encoding. The byte tables
-of the specification are printed from these declarations.
+Canonical: values in the declared order, shortest encodings, no floats, no extension types. A reader
+re-packs what it read and compares, so that every content has exactly one encoding as an array.
+Versions 0.1 and 0.2 wrote maps from the keys to the values, which are still read, also in later
+files. The byte tables of the specification are printed from these declarations.
 """
 
 from __future__ import annotations
@@ -21,10 +22,10 @@ _TYPES = {"bin": "bytes", "ints": "list", "strs": "list"}
 
 @dataclass(frozen=True)
 class Field:
-    """One entry of a chunk's map.
+    """One value of a chunk.
 
     Attributes:
-        key: Name in the map.
+        key: Its name, which maps of earlier versions hold.
         kind: ``int``, ``str``, ``bin``, ``ints`` (an array of integers) or ``strs`` (of strings).
         meaning: One sentence for the specification.
         low: Smallest integer, or smallest number of bytes or characters.
@@ -61,34 +62,49 @@ class Field:
 
 
 def pack(fields: tuple[Field, ...], values: Mapping[str, Any]) -> bytes:
-    """Packs `values`, which must be valid, in declared order."""
+    """Packs `values`, which must be valid, in declared order.
+
+    Raises:
+        ValueError: A value does not fit its declaration.
+    """
     for field in fields:
         problem = field.problem(values[field.key])
         if problem:
             raise ValueError(f"field {field.key!r} {problem}")
-    packed: bytes = msgpack.packb({f.key: values[f.key] for f in fields}, use_bin_type=True)
+    packed: bytes = msgpack.packb([values[f.key] for f in fields], use_bin_type=True)
     return packed
 
 
 def unpack(fields: tuple[Field, ...], payload: bytes, where: str) -> dict[str, Any]:
-    """The checked map of a payload.
+    """The checked values of a payload, by key.
 
     Raises:
         FormatError: Not msgpack, not canonical, a missing, unknown or out-of-range field.
     """
     try:
-        values = msgpack.unpackb(
+        content = msgpack.unpackb(
             payload, raw=False, strict_map_key=True, max_ext_len=0, max_map_len=64,
             max_array_len=1 << 20,
         )  # fmt: skip
     except (ValueError, TypeError, RecursionError, msgpack.UnpackException) as error:
         raise FormatError(f"payload is not valid msgpack ({type(error).__name__})", where) from None
-    if not isinstance(values, dict) or list(values) != [f.key for f in fields]:
-        raise FormatError(f"payload is not a map of {', '.join(f.key for f in fields)}", where)
+    values = _by_key(fields, content, where)
     for field in fields:
         problem = field.problem(values[field.key])
         if problem:
             raise FormatError(f"field {field.key!r} {problem}", where)
-    if msgpack.packb(values, use_bin_type=True) != payload:
+    if msgpack.packb(content, use_bin_type=True) != payload:
         raise FormatError("payload is not in canonical form", where)
     return values
+
+
+def _by_key(fields: tuple[Field, ...], content: Any, where: str) -> dict[str, Any]:
+    keys = [f.key for f in fields]
+    if isinstance(content, dict) and list(content) == keys:
+        return content
+    if not isinstance(content, list):
+        raise FormatError(f"payload is neither an array nor a map of {', '.join(keys)}", where)
+    if len(content) != len(keys):
+        counts = f"{len(content)} values instead of {len(keys)}"
+        raise FormatError(f"payload has {counts}: {', '.join(keys)}", where)
+    return dict(zip(keys, content, strict=True))

@@ -2,30 +2,32 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from ..errors import FormatError, UnsupportedError
 from ..limits import DEFAULT_LIMITS, Limits
-from . import check, head, layr, mesh, meta, netw, plan, pose, texr, tree, undo
+from . import check, head, layr, mesh, meta, motn, netw, plan, pose, texr, tree, undo
 from .chunks import Chunk, read, write
 from .fields import Field, pack, unpack
 
 Values = Mapping[str, Any]
 
 _STRUCTURE = (layr.TYPE, mesh.TYPE, pose.TYPE, netw.TYPE, plan.TYPE, texr.TYPE)
-_SINGLE = {
-    meta.INFO_TYPE: meta.INFO_FIELDS,
-    tree.TYPE: tree.FIELDS,
-    undo.TYPE: undo.FIELDS,
-}
+_SINGLE = (meta.INFO_TYPE, tree.TYPE, motn.TYPE, undo.TYPE)
 _BLOCK_NAMES = {type_: name for name, type_ in meta.BLOCKS.items()}
+_FIELDS = {
+    **{m.TYPE: m.FIELDS for m in (head, layr, mesh, pose, netw, plan, tree, motn, undo)},
+    **dict.fromkeys(_BLOCK_NAMES, meta.FIELDS),
+    meta.INFO_TYPE: meta.INFO_FIELDS,
+}
 
 
 @dataclass(frozen=True)
 class Container:
-    """A parsed file: the checked maps of its chunks, in file order.
+    """A parsed file: the checked values of its chunks by key, in file order.
 
     Attributes:
         head: Fields of HEAD.
@@ -36,6 +38,7 @@ class Container:
         meshes: Fields of each MESH.
         poses: Fields of each POSE.
         tree: Fields of tREE, or None.
+        motion: Fields of mOTN, or None.
         history: Steps of uNDO that led to this state.
         blocks: Metadata blocks by name: ``icc``, ``exif``, ``xmp``.
         info: Fields of iNFO, or None.
@@ -51,6 +54,7 @@ class Container:
     meshes: tuple[Values, ...] = ()
     poses: tuple[Values, ...] = ()
     tree: Values | None = None
+    motion: Values | None = None
     history: tuple[undo.Step, ...] = ()
     blocks: Mapping[str, bytes] = field(default_factory=dict)
     info: Values | None = None
@@ -76,9 +80,8 @@ def parse(data: bytes, limits: Limits = DEFAULT_LIMITS) -> Container:
         raise FormatError(
             "the first chunk is not HEAD", f"chunk {chunks[0].type}", chunks[0].offset
         )
-    header = _unpack(head.FIELDS, chunks[0])
+    header = _unpack(chunks[0])
     parts: dict[str, list[Values]] = {t: [] for t in _STRUCTURE}
-    fields = {m.TYPE: m.FIELDS for m in (layr, mesh, pose, netw, plan)}
     blocks: dict[str, bytes] = {}
     single: dict[str, Values] = {}
     history: tuple[undo.Step, ...] = ()
@@ -93,8 +96,7 @@ def parse(data: bytes, limits: Limits = DEFAULT_LIMITS) -> Container:
             if _STRUCTURE.index(chunk.type) < stage or blocks or single:
                 raise FormatError("out of order", where, chunk.offset)
             stage = _STRUCTURE.index(chunk.type)
-            declared = fields.get(chunk.type) or texr.fields_of(chunk.payload)
-            parts[chunk.type].append(_unpack(declared, chunk))
+            parts[chunk.type].append(_unpack(chunk))
         elif chunk.type in _BLOCK_NAMES:
             name = _BLOCK_NAMES[chunk.type]
             if name in blocks:
@@ -103,10 +105,10 @@ def parse(data: bytes, limits: Limits = DEFAULT_LIMITS) -> Container:
         elif chunk.type in _SINGLE:
             if chunk.type in single:
                 raise FormatError("appears twice", where, chunk.offset)
-            single[chunk.type] = _unpack(_SINGLE[chunk.type], chunk)
+            single[chunk.type] = _unpack(chunk)
             if chunk.type == undo.TYPE:
                 present = [c for c in chunks if c.type not in (undo.TYPE, "TAIL")]
-                history = undo.decode(chunk.payload, present, where, limits)
+                history = _renewed(undo.decode(chunk.payload, present, where, limits))
         elif chunk.type in (head.TYPE, "TAIL"):
             raise FormatError("appears twice", where, chunk.offset)
         elif chunk.critical:
@@ -118,14 +120,42 @@ def parse(data: bytes, limits: Limits = DEFAULT_LIMITS) -> Container:
     container = Container(
         header, tuple(parts[layr.TYPE]), tuple(parts[netw.TYPE]), tuple(parts[texr.TYPE]),
         tuple(parts[plan.TYPE]), tuple(parts[mesh.TYPE]), tuple(parts[pose.TYPE]),
-        single.get(tree.TYPE), history, blocks, single.get(meta.INFO_TYPE), tuple(extra), sizes,
+        single.get(tree.TYPE), single.get(motn.TYPE), history, blocks,
+        single.get(meta.INFO_TYPE), tuple(extra), sizes,
     )  # fmt: skip
     check.check(container, limits)
     return container
 
 
-def _unpack(fields: tuple[Field, ...], chunk: Chunk) -> Values:
-    return unpack(fields, chunk.payload, f"chunk {chunk.type} at byte {chunk.offset}")
+def fields_of(chunk: Chunk) -> tuple[Field, ...]:
+    """The declared fields of a chunk; none if it is not a structured one.
+
+    Raises:
+        UnsupportedError: A texture coder that is not known.
+    """
+    return texr.fields_of(chunk.payload) if chunk.type == texr.TYPE else _FIELDS.get(chunk.type, ())
+
+
+def _unpack(chunk: Chunk) -> Values:
+    return unpack(fields_of(chunk), chunk.payload, f"chunk {chunk.type} at byte {chunk.offset}")
+
+
+def _renewed(steps: tuple[undo.Step, ...]) -> tuple[undo.Step, ...]:
+    """A history whose chunks are as `present` writes them, so that states can share them.
+
+    Those that are not right stay as they are: going back to such a state says what is wrong.
+    """
+
+    def renewed(chunk: Chunk) -> Chunk:
+        payload = chunk.payload
+        with contextlib.suppress(FormatError, UnsupportedError):
+            if payload[:1] < b"\x90" and (fields := fields_of(chunk)):
+                payload = pack(fields, unpack(fields, payload, ""))
+        return Chunk(chunk.type, payload)
+
+    once = {id(chunk): chunk for step in steps for chunk in step.chunks}
+    new = {key: renewed(chunk) for key, chunk in once.items()}
+    return tuple(undo.Step(s.operation, tuple(new[id(c)] for c in s.chunks)) for s in steps)
 
 
 def serialize(c: Container) -> bytes:
@@ -152,4 +182,6 @@ def present(c: Container) -> list[Chunk]:
         chunks.append(Chunk(meta.INFO_TYPE, pack(meta.INFO_FIELDS, c.info)))
     if c.tree is not None:
         chunks.append(Chunk(tree.TYPE, pack(tree.FIELDS, c.tree)))
+    if c.motion is not None:
+        chunks.append(Chunk(motn.TYPE, pack(motn.FIELDS, c.motion)))
     return [*chunks, *c.extra]

@@ -56,11 +56,13 @@ def fields_of(payload: bytes) -> tuple[Field, ...]:
     Raises:
         UnsupportedError: The coder is not known.
     """
-    # The first entry of a canonical map is `coder`: a one-byte header, the key, a small integer,
-    # which is itself below 128, or follows a byte CC.
-    coder = IMPLICIT
-    if payload[1:7] == b"\xa5coder":
-        first, second = payload[7:8], payload[8:9]
+    # The coder comes first: after the header, of one byte, and in a map after its key. It is a
+    # small integer, which is itself below 128, or follows a byte CC.
+    coder, key, header = IMPLICIT, b"\xa5coder", payload[:1]
+    in_map = b"\x80" <= header < b"\x90" and payload.startswith(key, 1)
+    if in_map or b"\x90" <= header < b"\xa0":
+        at = 1 + in_map * len(key)
+        first, second = payload[at : at + 1], payload[at + 1 : at + 2]
         if b"" < first < b"\x80":
             coder = int.from_bytes(first)
         elif first == b"\xcc" and second >= b"\x80":

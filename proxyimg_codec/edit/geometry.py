@@ -146,13 +146,16 @@ def flip(
     return mapped(image, layer, (across, 0, 0, down, 0, 0), pivot, "flip")
 
 
-def meshed(layer: Layer) -> Layer:
-    """The layer with a mesh: its own, or one derived from its shape."""
+def meshed(layer: Layer, edge: float | None = None) -> Layer:
+    """The layer with a mesh: its own, or one derived from its shape, with edges of length `edge`.
+
+    Lengths are relative to the diagonal of the shape; None = what suits edits.
+    """
     if layer.mesh is not None:
         return layer
     assert layer.image is not None
     size = (layer.image.width, layer.image.height)
-    edge = EDGE_BACK if layer.boundary is None else EDGE_FRONT
+    edge = edge or (EDGE_BACK if layer.boundary is None else EDGE_FRONT)
     return replace(layer, mesh=Mesh.build(mesher.delaunay(layer.boundary, size, edge)))
 
 

@@ -15,10 +15,11 @@ _ESCAPE = 15
 
 
 def encode(values: Ints) -> tuple[bytes, bytes]:
-    """Classes (a coded array [C, 1, N]) and raw bits of `values` [C, N], each below 2**31."""
+    """Classes (a coded array) and raw bits of `values` [C, N] or [C, H, N], each below 2**31."""
     bits = np.where(values == 0, 0, np.floor(np.log2(np.maximum(np.abs(values), 1))) + 1)
     classes = np.minimum(bits.astype(np.int64), _ESCAPE)
-    coded = arrays.encode(classes[:, None, :], 4, np.ones((1, values.shape[1]), bool))
+    grid = classes.reshape(len(classes), -1, classes.shape[-1])
+    coded = arrays.encode(grid, 4, np.ones(grid.shape[1:], bool))
     raw = "".join(
         f"{int(v < 0)}{_magnitude(int(abs(v)), int(c))}"
         for v, c in zip(values.ravel(), classes.ravel(), strict=True)
@@ -34,15 +35,17 @@ def _magnitude(value: int, klass: int) -> str:
     return f"{value:b}"[1:]
 
 
-def decode(coded: bytes, raw: bytes, channels: int, count: int, where: str) -> Ints:
-    """Inverse of `encode`: values [channels, count].
+def decode(
+    coded: bytes, raw: bytes, channels: int, count: int, where: str, rows: int = 1
+) -> Ints:  # fmt: skip
+    """Inverse of `encode`: values [channels, rows * count].
 
     Raises:
         FormatError: Corrupt streams, a wrong length, or a class that is larger than needed.
     """
-    stored = np.ones((1, count), bool)
-    classes = arrays.decode(coded, (channels, 1, count), 4, stored).ravel().astype(np.int64)
-    return _read(raw, classes, where).reshape(channels, count)
+    stored = np.ones((rows, count), bool)
+    classes = arrays.decode(coded, (channels, rows, count), 4, stored).ravel().astype(np.int64)
+    return _read(raw, classes, where).reshape(channels, rows * count)
 
 
 def _read(data: bytes, classes: Ints, where: str) -> Ints:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
@@ -59,6 +59,8 @@ class Pose:
         opacity: 0..65535.
         hidden: Whether the layer is not drawn.
         colour: Rows of a 3 x 4 matrix in 2**-12 that maps colour and one to colour, or ().
+        sway: int64 [N, 2] further displacement of each node in 1/1024 canvas pixel, at a moment of
+            a timeline, or None.
     """
 
     matrix: tuple[int, int, int, int] = (_UNIT, 0, 0, _UNIT)
@@ -68,6 +70,7 @@ class Pose:
     opacity: int = OPACITY_MAX
     hidden: bool = False
     colour: tuple[int, ...] = ()
+    sway: Ints | None = None
 
     @property
     def affine(self) -> bool:
@@ -83,13 +86,32 @@ class Pose:
     @property
     def bent(self) -> bool:
         """Whether the mesh is needed to draw the layer."""
-        return self.nodes is not None or self.places is not None
+        return self.displaced or self.places is not None
+
+    @property
+    def displaced(self) -> bool:
+        """Whether nodes are displaced before the affine map."""
+        return self.nodes is not None or self.sway is not None
+
+    @property
+    def displacements(self) -> Ints:
+        """int64 [N, 2] displacement of each node in 1/1024 canvas pixel, where `displaced`."""
+        parts = [v for v in (self.sway,) if v is not None]
+        if self.nodes is not None:
+            parts.append(self.nodes << (FRACTION_BITS - NODE_BITS))
+        return parts[0] if len(parts) == 1 else parts[0] + parts[1]
 
     @property
     def at_rest(self) -> bool:
         """Whether nothing was done at all."""
         plain = self.opacity == OPACITY_MAX and not self.hidden and not self.colour
         return plain and not self.affine and not self.bent
+
+    def still(self, other: Pose) -> bool:
+        """Whether layers in these poses lie to each other as at rest, and are drawn in full."""
+        return (self.matrix, self.shift) == (other.matrix, other.shift) and not any(
+            p.bent or p.hidden or p.opacity != OPACITY_MAX for p in (self, other)
+        )
 
     @property
     def floats(self) -> Matrix:
@@ -115,10 +137,15 @@ class Pose:
 
     def present(self, refined: Refined) -> Ints:
         """Present positions [N, 2] of all nodes in 1/1024 canvas pixel."""
-        nodes = refined.nodes
-        if self.nodes is not None:
-            nodes = nodes + (self.nodes << (FRACTION_BITS - NODE_BITS))
-        return self.apply(nodes)
+        return self.apply(refined.nodes + self.displacements if self.displaced else refined.nodes)
+
+    def frozen(self) -> Pose:
+        """The pose with its sway among the displacements of its nodes, in 1/16 px, half up."""
+        if self.sway is None:
+            return self
+        shift = FRACTION_BITS - NODE_BITS
+        nodes = (self.displacements + (1 << (shift - 1))) >> shift
+        return replace(self, nodes=nodes if nodes.any() else None, sway=None)
 
 
 REST = Pose()
@@ -155,7 +182,8 @@ def fixed(matrix: Matrix) -> tuple[tuple[int, int, int, int], tuple[int, int]] |
 
 
 def encode(pose: Pose, mesh: Mesh | None) -> dict[str, Any]:
-    """The fields of POSE, without the layer."""
+    """The fields of POSE, without the layer; a sway is rounded to displacements of nodes."""
+    pose = pose.frozen()
     out: dict[str, Any] = {
         "matrix": list(pose.matrix), "shift": list(pose.shift), "opacity": pose.opacity,
         "hidden": int(pose.hidden), "colour": list(pose.colour),
@@ -164,7 +192,7 @@ def encode(pose: Pose, mesh: Mesh | None) -> dict[str, Any]:
         classes = raw = b""
         if values is not None:
             assert mesh is not None, "displacements need a mesh"
-            classes, raw = deltas.encode(_residuals(values, mesh.refined).T)
+            classes, raw = deltas.encode(residuals(values, mesh.refined).T)
         out |= {f"{name}_classes": classes, f"{name}_deltas": raw}
     return out
 
@@ -192,7 +220,7 @@ def decode(fields: Mapping[str, Any], mesh: Mesh | None, where: str) -> Pose:
         if mesh is None:
             raise FormatError("displacements need a mesh", where)
         refined = mesh.refined
-        values = _values(deltas.decode(coded, raw, 2, len(refined.nodes), where).T, refined, mesh)
+        values = restored(deltas.decode(coded, raw, 2, len(refined.nodes), where).T, refined)
         if np.abs(values).max() >= NODE_MAX:
             raise FormatError("a displacement is out of range", where)
         if not values.any():
@@ -207,17 +235,20 @@ def decode(fields: Mapping[str, Any], mesh: Mesh | None, where: str) -> Pose:
     return pose
 
 
-def _residuals(values: Ints, refined: Refined) -> Ints:
-    """Vertices against the one before, midpoints against the mean of their ends, rounded down."""
+def residuals(values: Ints, refined: Refined) -> Ints:
+    """Values [N, C] of nodes less their prediction from others.
+
+    That is the vertex before, or the mean, rounded down, of the ends that a midpoint lies between.
+    """
     own = refined.parents[:, 0] == refined.parents[:, 1]
-    before = np.concatenate([np.zeros((1, 2), np.int64), values[:-1]])
+    before = np.concatenate([values[:1] * 0, values[:-1]])
     mean = (values[refined.parents[:, 0]] + values[refined.parents[:, 1]]) >> 1
     return values - np.where(own[:, None], before, mean)
 
 
-def _values(residuals: Ints, refined: Refined, mesh: Mesh) -> Ints:
-    """Inverse of `_residuals`."""
-    count = len(mesh.base.vertices)
+def restored(residuals: Ints, refined: Refined) -> Ints:
+    """Inverse of `residuals`."""
+    count = int((refined.parents[:, 0] == refined.parents[:, 1]).sum())
     out = residuals.copy()
     out[:count] = np.cumsum(residuals[:count], axis=0)
     done = count

@@ -45,16 +45,16 @@ def outline(
         mesh: Needed if the pose displaces nodes.
         size: Width and height of the canvas.
     """
-    if not pose.affine and pose.nodes is None:
+    if not pose.affine and not pose.displaced:
         return boundary
     if boundary is None:
         boundary = _rectangle(size)
-    if pose.nodes is None:
+    if not pose.displaced:
         up = FRACTION_BITS - boundary.unit
         return Boundary(FRACTION_BITS, tuple(pose.apply(p << up) for p in boundary.paths))
     assert mesh is not None, "displaced nodes need a mesh"
     ride = _ride(boundary, mesh)
-    moved = ride.points + ride.displacement(pose.nodes << (FRACTION_BITS - NODE_BITS))
+    moved = ride.points + ride.displacement(pose.displacements)
     parts = np.split(pose.apply(moved), np.cumsum(ride.lengths)[:-1])
     return Boundary(FRACTION_BITS, tuple(parts))
 

@@ -92,7 +92,9 @@ class _Painter:
         self._paths = outline(layer.outline, view)
         self._warp = Warp(layer.pose, layer.mesh, layer.sampling in (1, 2), limits)
         sx, sy = view.supersampling
-        self._caching = view.width * sx * view.height * sy <= cache.SAMPLES_MAX
+        small = view.width * sx * view.height * sy <= cache.SAMPLES_MAX
+        # A moment of a motion is drawn once; keeping it would only push out what stays.
+        self._caching = small and layer.pose.sway is None
 
     def sheet(self, box: Rectangle) -> cache.Sheet:
         """The layer on a rectangle of samples: its coverage, and the colours known so far."""
@@ -119,7 +121,7 @@ class _Painter:
         layer, pose = self._layer, self._layer.pose
         arrays = tuple(None if v is None else v.tobytes() for v in (pose.nodes, pose.places))
         return (
-            layer.boundary, layer.texture, layer.network, layer.mesh,
+            layer.boundary, layer.texture, layer.apart, layer.network, layer.mesh,
             layer.box, layer.sampling, pose.matrix, pose.shift, arrays,
             self._view, box, self._engine,
         )  # fmt: skip
@@ -157,7 +159,7 @@ class _Painter:
         shown = self._warp.locate(x, y, face)
         texture = layer.texture
         if isinstance(texture, PyramidTexture):
-            return premultiplied(texture.sample(shown.x, shown.y, layer.box))
+            return premultiplied(texture.sample(shown.x, shown.y, layer.box, layer.apart))
         if layer.sampling:
             return premultiplied(_at_nodes(self._image, layer, texture, shown))
         network = self._image.networks[texture.network]

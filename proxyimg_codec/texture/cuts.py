@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,26 @@ REACH = 2
 """Samples that a boundary spoils on either side of itself, by blur and by coding."""
 
 Samples = NDArray[np.bool_]
+
+
+class Apart(NamedTuple):
+    """What no longer lies to a view as it did when its samples were mixed.
+
+    Attributes:
+        fronts: Those of `Cuts.fronts` that do not.
+        behind: Boundaries of what lay behind, front to back, None being everywhere, each with
+            whether it still lies as it did; empty if all do.
+    """
+
+    fronts: frozenset[Boundary] = frozenset()
+    behind: tuple[tuple[Boundary | None, bool], ...] = ()
+
+
+NOTHING = Apart()
+"""All is as it was."""
+
+GONE = ((None, False),)
+"""`Apart.behind` if nothing is left of what lay behind."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,27 +78,59 @@ class Cuts:
         return Cuts(own, tuple(b for b in fronts if b is not None), box)
 
     def numbers(self, layer: int, boundaries: Sequence[Boundary | None]) -> list[int] | None:
-        """Ascending numbers for `of`; None if a boundary is not, or no longer, where it was.
-
-        Of equal boundaries the hindmost in front of the layer is named, those that are not only
-        equal but the same object before others.
-        """
-        if self.own is not None and not _equal(self.own, boundaries[layer]):
+        """Ascending numbers for `of`; None if a boundary is not, or no longer, where it was."""
+        found = self._found(layer, boundaries)
+        if len(found) < len({*self.fronts}) or not self._owns(boundaries[layer]):
             return None
+        return sorted({*found.values(), *([] if self.own is None else [layer])})
+
+    def apart(
+        self,
+        layer: int,
+        boundaries: Sequence[Boundary | None],
+        still: Sequence[bool],
+        raster: Sequence[bool],
+    ) -> Apart:
+        """What is apart from a view that layer `layer` was cut for.
+
+        Args:
+            layer: Number of the layer.
+            boundaries: Of all layers, back to front.
+            still: Whether each lies to who shows the view as it did at rest.
+            raster: Whether each shows something of the same raster.
+        """
+        found = self._found(layer, boundaries)
+        fronts = (f for f in self.fronts if f not in found or not still[found[f]])
+        behind: tuple[tuple[Boundary | None, bool], ...] = GONE
+        if self._owns(boundaries[layer]):
+            below = [] if self.own is None else range(layer - 1, -1, -1)
+            behind = tuple((boundaries[k], still[k]) for k in below if raster[k])
+            if all(rests for _, rests in behind):
+                behind = ()
+        return Apart(frozenset(fronts), behind)
+
+    def _owns(self, boundary: Boundary | None) -> bool:
+        """Whether the layer's own boundary, if it cuts, is this one."""
+        return self.own is None or _equal(self.own, boundary)
+
+    def _found(self, layer: int, boundaries: Sequence[Boundary | None]) -> dict[Boundary, int]:
+        """The layers in front of layer `layer` that have the boundaries of `fronts`.
+
+        Of equal boundaries the hindmost is named, those that are not only equal but the same
+        object before others.
+        """
         found: dict[Boundary, int] = {}
         wanted = set(self.fronts)
         for n in range(len(boundaries) - 1, layer, -1):
             boundary = boundaries[n]
             if boundary in wanted:
                 found[boundary] = n
-        for front in self.fronts:
-            if front not in found:
-                later = range(layer + 1, len(boundaries))
-                number = next((n for n in later if _equal(front, boundaries[n])), None)
-                if number is None:
-                    return None
+        for front in wanted - found.keys():
+            later = range(layer + 1, len(boundaries))
+            number = next((n for n in later if _equal(front, boundaries[n])), None)
+            if number is not None:
                 found[front] = number
-        return sorted({*found.values(), *([] if self.own is None else [layer])})
+        return found
 
     @cached_property
     def shown(self) -> Samples:
@@ -86,7 +139,7 @@ class Cuts:
         Those that no front covers wholly, and of which `own` covers something: all that the layer
         contributes to where nothing was moved, mixed with what is beside it or not.
         """
-        shown = self._left(mixed=True)
+        shown = self._left(NOTHING)
         return shown if shown.any() else ~shown
 
     @cached_property
@@ -95,41 +148,59 @@ class Cuts:
 
         Those further than `REACH` from samples that a front covers, or `own` does not, in part.
         """
-        trusted = self._left(mixed=False)
-        return trusted if trusted.any() else self.shown
+        return self.kept(self.everything)
 
-    def lasting(self, own: Boundary | None, fronts: Collection[Boundary | None]) -> Samples:
-        """The samples to keep, bool [height, width], once some boundaries are gone; never none.
+    @property
+    def everything(self) -> Apart:
+        """All that cuts, apart."""
+        return Apart(frozenset(self.fronts), GONE)
 
-        At these they are the trusted ones: no layer is left that mixed ones would fit.
+    def kept(self, apart: Apart) -> Samples:
+        """The samples to take as they are, bool [height, width]; `shown` if none would be.
 
-        Args:
-            own: The boundary that the layer has now.
-            fronts: Those that are in front of it now.
+        At what is apart they are the trusted ones: mixed ones fit nothing that is left there.
         """
+        return _kept(self, apart)
 
-        def only(left: bool) -> Cuts:
-            kept = (f for f in self.fronts if any(_equal(f, v) for v in fronts) == left)
-            return Cuts(self.own if _equal(self.own, own) == left else None, (*kept,), self.box)
-
-        kept = only(True)._left(mixed=True) & only(False)._left(mixed=False)
-        return kept if kept.any() else self.shown
-
-    def _left(self, mixed: bool) -> Samples:
-        """The samples that are not cut off as a whole, or if not `mixed`, that have none cut near.
+    def _left(self, apart: Apart) -> Samples:
+        """The samples that are not cut off as a whole, nor near a cut by what is apart.
 
         Unlike what is made of them, they may be none.
         """
         _, _, width, height = self.box
-        left = np.ones((height, width), np.bool_)
-        for k, boundary in enumerate((self.own, *self.fronts)):
-            if boundary is not None:
-                clear = np.full((height, width), k > 0)
-                for at, covered in self._coverage(boundary):
-                    lost = covered if k else FULL - covered
-                    clear[at] = lost < FULL if mixed else lost == 0
-                left &= clear
-        return left if mixed else _eroded(left)
+        left, clear = np.ones((2, height, width), np.bool_)
+        for boundary in self.fronts:
+            some, whole = self._covered(boundary)
+            left &= ~whole
+            if boundary in apart.fronts:
+                clear &= ~some
+        if self.own is not None:
+            some, whole = self._covered(self.own)
+            left &= some
+            if apart.behind:
+                clear &= whole | ~self._bared(apart)
+        return left & _eroded(clear)
+
+    def _bared(self, apart: Apart) -> Samples:
+        """The samples of which the first thing behind is apart; that may cover them in part."""
+        _, _, width, height = self.box
+        bared, hidden = np.zeros((2, height, width), np.bool_)
+        for boundary, rests in apart.behind:
+            some, whole = self._covered(boundary)
+            if rests:
+                hidden |= whole
+            else:
+                bared |= some & ~hidden
+        return bared
+
+    def _covered(self, boundary: Boundary | None) -> tuple[Samples, Samples]:
+        """The samples of which a boundary covers something, and all."""
+        _, _, width, height = self.box
+        some, whole = np.full((2, height, width), boundary is None)
+        if boundary is not None:
+            for at, covered in self._coverage(boundary):
+                some[at], whole[at] = covered > 0, covered == FULL
+        return some, whole
 
     def _coverage(
         self, boundary: Boundary
@@ -150,6 +221,13 @@ class Cuts:
             rows = min(step, y1 - row)
             at = slice(row - y, row - y + rows), columns
             yield at, coverage(paths, x0, row, x1 - x0, rows)
+
+
+@lru_cache(maxsize=64)
+def _kept(cuts: Cuts, apart: Apart) -> Samples:
+    """`Cuts.kept`; what is apart often stays so while it moves."""
+    kept = cuts._left(apart)
+    return kept if kept.any() else cuts.shown
 
 
 def _eroded(samples: Samples) -> Samples:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -170,6 +170,56 @@ def encoded(
     return Planes(fields)
 
 
+def salvaged(planes: Planes) -> tuple[Planes, int]:
+    """Planes with the levels that can be decoded of a stream that is cut off or damaged.
+
+    A level is in vain if the stream fails in it. If it only does not end where it should, the
+    finest one is: wherever the damage is, what comes last is wrong.
+
+    Args:
+        planes: As they were read; `data` may be shorter than it says.
+
+    Returns:
+        Planes with a sound stream, and how many levels they have from it; finer ones are 0. The
+        same planes if nothing is wrong.
+
+    Raises:
+        FormatError: Not even the lowest planes can be decoded.
+    """
+    packed, support, where = planes.packed, planes.support, planes.where
+    found: list[Ints] = []
+    try:
+        coder = _Decoder(_cut(packed["data"]), packed["escapes"])
+        for latents in _steps(coder, packed, support, None):
+            found.append(latents)
+        coder.finish(where)
+    except FormatError as error:
+        if not found:
+            raise FormatError(f"none of the planes can be decoded: {error}", where) from None
+    else:
+        return planes, packed["levels"]
+    del found[packed["levels"] :]
+    count = len(found) - 1
+    rows, columns = found[0].shape[1:]
+    found += [
+        np.zeros((9, rows << k, columns << k), np.int32) for k in range(count, packed["levels"])
+    ]
+    shifts = tuple(v - SHIFT_ORIGIN for v in packed["shifts"])
+    sound = encoded(
+        Latents(tuple(found[:0:-1]), found[0]), planes.size, packed["step"], support,
+        packed["cell"], planes.components, packed["model"], shifts,
+    )  # fmt: skip
+    return replace(sound, where=where), count
+
+
+def _cut(data: bytes) -> bytes:
+    """A stream that does not promise more words than there are."""
+    head = 5 + (4 << data[0] if data else 0)
+    there = max(len(data) - head, 0) // 2
+    words = min(int.from_bytes(data[head - 4 : head], "little"), there)
+    return data[: head - 4] + words.to_bytes(4, "little") + data[head:] if there else data
+
+
 def cells_of(size: tuple[int, int], cell: int) -> tuple[int, int]:
     """Rows and columns of cells of a raster."""
     return -(-size[1] >> cell), -(-size[0] >> cell)
@@ -325,14 +375,23 @@ def _code(
     coder: _Encoder | _Decoder, fields: Mapping[str, Any], cells: NDArray[np.bool_],
     values: Latents | None,
 ) -> Latents:  # fmt: skip
-    """Codes all latents, coarsest first."""
+    """Codes all latents."""
+    lowest, *found = _steps(coder, fields, cells, values)
+    return Latents(tuple(found[::-1]), lowest)
+
+
+def _steps(
+    coder: _Encoder | _Decoder, fields: Mapping[str, Any], cells: NDArray[np.bool_],
+    values: Latents | None,
+) -> Iterator[Ints]:  # fmt: skip
+    """Codes and gives the lowest planes, then each level, coarsest first."""
     weights = model.registered(fields["model"])
     levels, step, size = fields["levels"], fields["step"], fields["size"]
     columns, rows = (-(-n >> levels) for n in size)
     lowest = _code_lowest(coder, fields, (rows, columns), values)
+    yield lowest
     plain = lowest << 4
     parent = np.zeros((9, -(-rows // 2), -(-columns // 2)), np.int32)
-    found: list[Ints] = []
     for level in range(levels, 0, -1):
         shifts = fields["shifts"][2 * level - 2 : 2 * level]
         here = context.LevelCoder(
@@ -345,10 +404,9 @@ def _code(
             parent = coder.level(context_native.Place(here, plain, parent, support), given)
         else:
             parent = here.code(coder, plain, parent, support, given)
-        found.append(parent)
+        yield parent
         if level > 1:
             plain = context.next_plain(plain, parent)
-    return Latents(tuple(found[::-1]), lowest)
 
 
 def _code_lowest(

@@ -7,7 +7,7 @@ trusted: with a mask all that are shown, with cuts those that no other layer is 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar
@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from ..container import texr
 from ..entropy import arrays
 from ..errors import FormatError
-from ..geometry.boundary import Boundary
-from .cuts import Cuts, Samples
+from .cuts import NOTHING, Apart, Cuts, Samples
 from .diffusion import FRACTION_BITS, diffused
 from .implicit import Box, ImplicitTexture
 from .network import Floats, Network
@@ -79,13 +78,11 @@ class PyramidTexture:
             return b""
         return arrays.encode(self.mask[None].astype(np.int64), 1, np.ones(self.mask.shape, bool))
 
-    def masked(
-        self, own: Boundary | None = None, fronts: Collection[Boundary | None] = ()
-    ) -> PyramidTexture:
-        """This view with a mask instead of cuts: 2x2 samples that `Cuts.lasting` all keeps."""
+    def masked(self, apart: Apart) -> PyramidTexture:
+        """This view with a mask instead of cuts: 2x2 samples that `Cuts.kept` all keeps."""
         if self.cuts is None:
             return self
-        kept = self.cuts.lasting(own, fronts)
+        kept = self.cuts.kept(apart)
         height, width = kept.shape
         whole = np.pad(kept, ((0, height % 2), (0, width % 2)), mode="edge")
         corners = [whole[j::2, i::2] for j in (0, 1) for i in (0, 1)]
@@ -119,6 +116,10 @@ class PyramidTexture:
         side = 1 << self.cell
         return self.mask.repeat(side, 0)[:height].repeat(side, 1)[:, :width]
 
+    def kept(self, apart: Apart) -> Samples | None:
+        """Those of `shown` that still fit once something is apart; None = all."""
+        return self.shown if self.cuts is None or apart == NOTHING else self.cuts.kept(apart)
+
     @cached_property
     def filled(self) -> NDArray[np.uint16]:
         """The part in 1/`FILL_ONE` [height * width, components, alpha last], from trusted samples.
@@ -135,7 +136,9 @@ class PyramidTexture:
         out = diffused(fixed, trusted).astype(np.uint16)
         return np.ascontiguousarray(np.moveaxis(out, 0, 2)).reshape(-1, len(out))
 
-    def sample(self, x: NDArray[np.float64], y: NDArray[np.float64], box: Box) -> Floats:
+    def sample(
+        self, x: NDArray[np.float64], y: NDArray[np.float64], box: Box, apart: Apart = NOTHING
+    ) -> Floats:
         """Colours [N, `channels`] at canvas points x, y [N], premultiplied, not clamped.
 
         Points on samples take these as they are; others are interpolated by cubic convolution with
@@ -145,23 +148,26 @@ class PyramidTexture:
             x: Canvas x of the points.
             y: Canvas y.
             box: The layer's rectangle.
+            apart: What `cuts` have lost.
 
         Raises:
             FormatError: The planes are corrupt.
         """
         column, fx = _position(x, box[0], box[2], self.part[2])
         row, fy = _position(y, box[1], box[3], self.part[3])
+        kept = self.kept(apart)
         if not (fx.any() or fy.any()):
-            return self._samples(row, column)
+            return self._samples(row, column, kept)
         out = np.empty((len(x), self.channels(())), np.float32)
         for i in range(0, len(x), CHUNK):
             at = slice(i, i + CHUNK)
-            out[at] = self._interpolated(row[at], column[at], fy[at], fx[at])
+            out[at] = self._interpolated(row[at], column[at], fy[at], fx[at], kept)
         return out
 
     def _interpolated(
-        self, row: NDArray[np.intp], column: NDArray[np.intp], fy: Floats, fx: Floats
-    ) -> Floats:
+        self, row: NDArray[np.intp], column: NDArray[np.intp], fy: Floats, fx: Floats,
+        kept: Samples | None,
+    ) -> Floats:  # fmt: skip
         """Colours of points at fractions fy, fx behind the samples of rows and columns."""
         _, _, width, height = self.part
         across, down = _weights(fx), _weights(fy)
@@ -170,19 +176,21 @@ class PyramidTexture:
             below = np.clip(row + (j - 1), 0, height - 1)
             for i in range(TAPS):
                 aside = np.clip(column + (i - 1), 0, width - 1)
-                total += (down[j] * across[i])[:, None] * self._samples(below, aside)
+                total += (down[j] * across[i])[:, None] * self._samples(below, aside, kept)
         return total
 
-    def _samples(self, row: NDArray[np.intp], column: NDArray[np.intp]) -> Floats:
+    def _samples(
+        self, row: NDArray[np.intp], column: NDArray[np.intp], kept: Samples | None
+    ) -> Floats:
         """Premultiplied samples [N, `channels`] of rows and columns of the part."""
         x, y, width, _ = self.part
         parts = []
         for planes in self.sources:
             at = (row + y) * planes.size[0] + (column + x)
             parts.append(planes.raster.reshape(-1, planes.components).take(at, 0))
-        if self.shown is not None:
+        if kept is not None:
             place = row * width + column
-            outside = np.flatnonzero(~self.shown.ravel().take(place))
+            outside = np.flatnonzero(~kept.ravel().take(place))
             if len(outside):
                 fill = self.filled.take(place[outside], 0) * np.float32(1 / FILL_ONE)
                 parts[0][outside] = fill[:, : self.planes.components]

@@ -3,6 +3,7 @@
 import sys
 from pathlib import Path
 
+import msgpack
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
@@ -25,7 +26,7 @@ REFUSED = {
     "invalid-shared-self": "earlier layer",
     "invalid-shared-later": "earlier layer",
     "invalid-shared-chain": "shared itself",
-    "invalid-shared-keys": "not a map of coder, texture",
+    "invalid-shared-values": "7 values instead of 2: coder, texture",
     "invalid-shared-sampling": "number of features",
     "invalid-sampling-mesh": "needs a mesh",
     "invalid-sampling-odd": "even number",
@@ -75,9 +76,21 @@ def test_other_coders_are_not_known(coder):
             parse(base.set(at, coder=coder))
 
 
-@pytest.mark.parametrize("value", [b"", b"\xcc\x01", b"\xcd\x01\x00", b"\xc3"])
-def test_what_has_no_small_coder_is_invalid(value):
-    payload = b"\x81\xa5coder" + value
+@pytest.mark.parametrize("start", [b"\x91", b"\x9f", b"\x81\xa5coder", b"\x8f\xa5coder"])
+@pytest.mark.parametrize("coder", [*texr.CODERS, 3, 127, 128, 255])
+def test_the_coder_stands_first_in_arrays_and_maps(start, coder):
+    payload = start + msgpack.packb(coder)
+    if coder in texr.CODERS:
+        assert texr.fields_of(payload) is texr.CODERS[coder]
+        return
+    with pytest.raises(UnsupportedError, match=f"coder {coder} "):
+        texr.fields_of(payload)
+
+
+@pytest.mark.parametrize("value", [b"", b"\xcc\x01", b"\xcd\x01\x00", b"\xc3", b"\xa5coder\x03"])
+@pytest.mark.parametrize("start", [b"\x91", b"\x81\xa5coder", b"\x81\xa5codes", b"\xa1", b""])
+def test_what_has_no_small_coder_is_invalid(start, value):
+    payload = start + value
     assert texr.fields_of(payload) is texr.FIELDS
     with pytest.raises(FormatError):
         parse(BASES[Posed].payload(DISC_TEXR, payload))

@@ -106,8 +106,8 @@ VIEWS = [
     (2, {"alpha": 2}, "TEXR: planes 1 do not exist"),
     (1, {"cell": 1}, "TEXR: cells without a mask"),
     (0, {"alpha": 1}, "TEXR: planes of alpha are not grey"),
-    (2, {"coder": 1}, "TEXR.*not a map of coder, network"),
-    (2, {"coder": 0}, "TEXR.*not a map of coder, texture"),
+    (2, {"coder": 1}, "TEXR.*field 'grid' is not of type ints"),
+    (2, {"coder": 0}, "TEXR.*7 values instead of 2: coder, texture"),
 ]
 
 

@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import msgpack
 import pytest
 from hypothesis import given
@@ -61,6 +63,25 @@ def test_steps_refer_to_states_that_open(small_pxi):
     again = from_bytes(edited.to_bytes())
     assert again.undone(2).to_bytes() == image.to_bytes()
     assert [layer.name for layer in again.undone().layers] == ["back", "bar", "disc"]
+
+
+def test_old_histories_share_chunks_with_the_present_once_saved():
+    """Version 0.2 wrote other payloads than today; kept as they were, nothing would be shared."""
+    old = Path(__file__).parents[1].joinpath("golden/0.2/edited.pxi").read_bytes()
+    assert read(old)[0].payload[0] < 0x90
+    image = from_bytes(old)
+    kept = {c.payload[0] >> 4 for step in image.history for c in step.chunks}
+    assert kept == {9}
+    assert len(image.to_bytes()) < 0.7 * len(old)
+
+
+def test_chunks_of_a_history_that_are_not_right_stay_as_they_are(small_pxi):
+    present = read(small_pxi.read_bytes())[:-1]
+    wrong = [("HEAD", b"\x80"), ("HEAD", b""), ("LAYR", b"\xc1"), ("TEXR", b"\x81\xa5coder\x09"),
+             ("teSt", b"\x80")]  # fmt: skip
+    step = Step("{}", tuple(Chunk(*pair) for pair in wrong))
+    file = write([*present, undo.encode(present, [step]), TAIL])
+    assert from_bytes(file).history == (step,)
 
 
 def test_the_oldest_steps_are_forgotten(monkeypatch):

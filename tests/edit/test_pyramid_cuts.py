@@ -12,9 +12,12 @@ from conformance.builders import ellipse
 from proxyimg_codec import pictures
 from proxyimg_codec.container.file import parse
 from proxyimg_codec.export import openraster
+from proxyimg_codec.geometry import coverage as cover
 from proxyimg_codec.geometry.boundary import Boundary
 from proxyimg_codec.image import Layers
-from proxyimg_codec.texture.cuts import Cuts
+from proxyimg_codec.render.compose import outline
+from proxyimg_codec.render.view import make_view
+from proxyimg_codec.texture.cuts import GONE, NOTHING, Apart, Cuts
 from tests.edit.test_operations import EDITS, covered, grown
 from tests.pyramids import SIZE, cut_picture, implicit, planes, view
 from tests.texture.test_cuts import near
@@ -32,6 +35,11 @@ def kinds(image):
         t["texture"] if t["coder"] == 0 else "mask" if t.get("mask") else t.get("cuts")
         for t in parse(image.to_bytes()).textures
     ]
+
+
+def alone(layer):
+    """The view of a layer, masked as if it were the only one."""
+    return layer.texture.masked(layer.texture.cuts.everything)
 
 
 def same_when_loaded(image):
@@ -123,31 +131,92 @@ def test_a_removed_object_leaves_nothing(cut):
 
 def test_masks_trust_nobody_where_a_boundary_was(cut):
     """Where it is the layer's own, or in front of it, as before, mixed samples stay."""
-    _, bar, disc = cut.layers
+    disc = cut.layers["disc"]
+    gone, own = Apart(frozenset([disc.boundary])), Apart(behind=GONE)
     left = {
-        "remove": {"back": (None, [bar.boundary]), "bar": (bar.boundary,)},
-        "point": {"back": (None, [bar.boundary]), "bar": (bar.boundary,), "disc": ()},
-        "order": {"bar": (bar.boundary,)},
+        "remove": {"back": gone, "bar": gone},
+        "point": {"back": gone, "bar": gone, "disc": own},
+        "order": {"bar": gone},
     }
     for name, layers in left.items():
         edited = EDITS[name](disc)
-        for layer, kept in layers.items():
-            expected = cut.layers[layer].texture.masked(*kept).mask
+        for layer, apart in layers.items():
+            expected = cut.layers[layer].texture.masked(apart).mask
             np.testing.assert_array_equal(edited.layers[layer].texture.mask, expected)
-            trusted = cut.layers[layer].texture.masked().mask
-            assert (edited.layers[layer].texture.mask != trusted).any() == (kept != ())
+            trusted = alone(cut.layers[layer]).mask
+            assert (edited.layers[layer].texture.mask != trusted).any() == (apart != own)
 
 
-def test_a_white_object_on_black_leaves_no_grey(made_up_planes):
-    """Hidden, it leaves the rim that it is mixed into; removed, not even that."""
+def test_masks_trust_nobody_where_something_was_moved(cut):
+    """What is seen stays as it is when another layer goes."""
+    bar, disc = cut.layers["bar"].boundary, cut.layers["disc"].boundary
+    moved = cut.layers["disc"].moved(0, -7).layers["bar"].removed()
+    expected = cut.layers["back"].texture.masked(Apart(frozenset([bar, disc]))).mask
+    np.testing.assert_array_equal(moved.layers["back"].texture.mask, expected)
+    same_when_loaded(moved)
+    hidden = cut.layers["bar"].hidden().layers["disc"].with_point(0, 0, 3, 1)
+    expected = cut.layers["disc"].texture.masked(Apart(behind=GONE)).mask
+    np.testing.assert_array_equal(hidden.layers["disc"].texture.mask, expected)
+
+
+def test_a_white_object_on_black_leaves_and_takes_no_grey(made_up_planes):
+    """The samples at its rim are mixed; they show only where both lie as they did."""
     shape = Boundary(4, (ellipse((31, 23), (13, 11)),))
     image = stack([(0, 0, *SIZE), (16, 10, 30, 26)], [None, shape], [[1], [1]])
-    back = image.layers[0].texture
-    white = grown(covered(image, "1"), 1)
-    back.planes.__dict__["raster"] = white[..., None].repeat(3, 2).astype(np.float32)
-    hidden = image.layers["1"].hidden().render()
-    np.testing.assert_array_equal(hidden, 255 * (white & back.shown)[..., None].repeat(3, 2))
-    assert image.layers["1"].removed().render().max() == 0
+    share = share_of(image, "1")
+    image.layers[0].texture.planes.__dict__["raster"] = share[..., None].repeat(3, 2)
+    disc = image.layers["1"]
+
+    def grey(picture):
+        return picture.render(dtype=np.float32)[..., 0]
+
+    np.testing.assert_allclose(grey(image), share, atol=1e-6)
+    moved = disc.moved(-9, 4)
+    np.testing.assert_allclose(grey(moved), np.roll(share, (4, -9), (0, 1)), atol=1e-4)
+    np.testing.assert_allclose(grey(moved.layers["1"].moved(9, -4)), share, atol=1e-6)
+    np.testing.assert_allclose(grey(disc.with_opacity(0.4)), 0.4 * share, atol=1e-4)
+    for turned in (disc.rotated(45), disc.dragged({(31, 14): (5, -6), (31, 34): (0, 0)})):
+        np.testing.assert_allclose(grey(turned), share_of(turned, "1"), atol=1e-4)
+    for gone in (disc.hidden(), disc.removed()):
+        assert grey(gone).max() == 0
+
+
+def share_of(image, name):
+    """How much of each pixel a layer covers, 0..1."""
+    view = make_view((image.width, image.height))
+    paths = outline(image.layers[name].outline, view)
+    return cover.coverage(paths, 0, 0, *SIZE).astype(np.float32) / cover.FULL
+
+
+def test_what_is_beside_a_moved_layer_stays(cut):
+    """The rims of others are mixed with what is still there, but where it was."""
+    for name, by in (("bar", (4, 9)), ("disc", (5, -3))):
+        moved = cut.layers[name].moved(*by)
+        changed = (moved.render() != cut.render()).any(-1)
+        near = grown(covered(cut, name)) | covered(moved, name)
+        assert not changed[~near].any()
+    bar = cut.layers["bar"].moved(40, 9)
+    disc = [v.render(layers=["disc"])[..., :3] for v in (cut, bar)]
+    lost = (disc[0] != disc[1]).any(-1)
+    assert lost.sum() > 20
+    assert not (lost & ~grown(covered(cut, "bar"))).any()
+
+
+def test_what_moves_together_keeps_what_is_between(cut):
+    def both(image):
+        return image.render(layers=["bar", "disc"])
+
+    moved = cut.edited(
+        {"op": "group", "layers": ["bar", "disc"], "name": "both"},
+        {"op": "move", "layer": "both", "by": [-2, 1]},
+    )
+    rest, now = both(cut)[:-1, 2:], both(moved)[1:, :-2]
+    union = covered(cut, "bar") | covered(cut, "disc")
+    inside = ~grown(~union, 3)[:-1, 2:]
+    meeting = inside & (grown(covered(cut, "disc"), 1) & ~covered(cut, "disc"))[:-1, 2:]
+    assert meeting.sum() > 20
+    np.testing.assert_array_equal(now[inside], rest[inside])
+    assert (now != rest).any()
 
 
 def test_orders_that_leave_all_fronts_in_front(cut):
@@ -172,7 +241,7 @@ def test_copies_in_front_of_the_back_are_masked_with_it(cut):
     assert kinds(lent) == [[1, 2], "mask", 1]
     own = cut.layers["disc"]
     assert lent.layers["bar"].texture is lent.layers["disc"].texture
-    expected = own.texture.masked(own.boundary).mask
+    expected = own.texture.masked(NOTHING).mask
     np.testing.assert_array_equal(lent.layers["disc"].texture.mask, expected)
     same_when_loaded(lent)
     back = cut.layers["disc"].textured("back")
@@ -188,9 +257,9 @@ def test_copies_that_lie_elsewhere(made_up_planes):
     same_when_loaded(lent)
     bare = image.layers["2"].textured("1").layers["1"].removed()
     assert kinds(bare) == [[], "mask"]  # it is not in front of itself
-    view = image.layers["1"].texture
-    np.testing.assert_array_equal(bare.layers["2"].texture.mask, view.masked().mask)
-    assert (view.masked().mask != view.masked(None, [shape]).mask).any()
+    trusted = alone(image.layers["1"]).mask
+    np.testing.assert_array_equal(bare.layers["2"].texture.mask, trusted)
+    assert (trusted != image.layers["1"].texture.masked(NOTHING).mask).any()
 
 
 def test_groups_scripts_and_undo(cut):
@@ -222,7 +291,7 @@ def test_textures_for_other_files(cut, made_up_planes, tmp_path, fit, name):
             assert kinds(changed) == [[1, 2], [1, 2], [2]]
             continue
         assert kinds(changed)[2] == "mask"
-        np.testing.assert_array_equal(taken.mask, cut.layers[name].texture.masked().mask)
+        np.testing.assert_array_equal(taken.mask, alone(cut.layers[name]).mask)
 
 
 def test_openraster_has_what_is_hidden(cut):

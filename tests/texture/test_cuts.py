@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from conformance.builders import ellipse, polygon
 from proxyimg_codec.geometry.boundary import Boundary
 from proxyimg_codec.texture import cuts as module
-from proxyimg_codec.texture.cuts import Cuts
+from proxyimg_codec.texture.cuts import GONE, NOTHING, Apart, Cuts
 from proxyimg_codec.texture.diffusion import diffused
 from proxyimg_codec.texture.pyramid import FILL_ONE
 from tests.pyramids import planes, view
@@ -160,22 +160,66 @@ def test_filling_waits_until_it_is_needed(cut):
     assert "filled" in cut.__dict__
 
 
-def test_what_lasts(cut):
-    """Near boundaries that are gone only trusted samples do, at others all that show."""
+def test_what_is_kept(cut):
+    """Near what is apart only trusted samples are, elsewhere all that show."""
     own, (disc,) = cut.cuts.own, cut.cuts.fronts
-    twin = Boundary(disc.unit, tuple(p.copy() for p in disc.paths))
     inner, outer = Cuts(own, (), PART), Cuts(None, (disc,), PART)
-    for there, kept in [
-        ((None, [own]), cut.cuts.trusted),
-        ((disc, []), cut.cuts.trusted),
-        ((own, [None]), inner.shown & outer.trusted),
-        ((None, [own, twin]), inner.trusted & outer.shown),
-        ((own, [twin]), cut.cuts.shown),
+    for apart, kept in [
+        (cut.cuts.everything, cut.cuts.trusted),
+        (Apart(frozenset([disc])), inner.shown & outer.trusted),
+        (Apart(behind=GONE), inner.trusted & outer.shown),
+        (NOTHING, cut.cuts.shown),
     ]:
-        np.testing.assert_array_equal(cut.cuts.lasting(*there), kept)
+        np.testing.assert_array_equal(cut.cuts.kept(apart), kept)
     small = Cuts(rectangle(128, 96, 160, 128), (disc,), PART)
     assert 0 < small.shown.sum() < small.shown.size
-    np.testing.assert_array_equal(small.lasting(None, []), small.shown)
+    np.testing.assert_array_equal(small.kept(small.everything), small.shown)
+
+
+@given(edges, st.lists(st.tuples(st.none() | edges, st.booleans()), max_size=3))
+def test_own_samples_are_lost_beside_what_is_apart_behind(own, behind):
+    """Where the first of what lies behind a sample that is not all the layer's is apart."""
+    box = (3, 2, 14, 9)
+    cuts = Cuts(rectangle(*own), (), box)
+
+    def covered(edge):
+        return np.array(
+            [[1 if edge is None else share(edge[0], edge[2], 3 + i) * share(edge[1], edge[3], 2 + j)
+              for i in range(14)] for j in range(9)]
+        )  # fmt: skip
+
+    mine, *others = (covered(v) for v in (own, *(edge for edge, _ in behind)))
+    bared = np.zeros((9, 14), bool)
+    for at in np.argwhere(mine < 1):
+        for below, (_, rests) in zip(others, behind, strict=True):
+            if below[tuple(at)] and not rests:
+                bared[tuple(at)] = True
+            if below[tuple(at)] == 1 or bared[tuple(at)]:
+                break
+    kept = (mine > 0) & ~near(bared)
+    apart = Apart(behind=tuple((e and rectangle(*e), rests) for e, rests in behind))
+    np.testing.assert_array_equal(cuts.kept(apart), kept if kept.any() else cuts.shown)
+
+
+def test_what_is_apart():
+    """Those in front and behind that do not rest, and what is behind only if it is cut too."""
+    a, b, c, d = (rectangle(0, 0, 16 * k, 16) for k in (1, 2, 3, 4))
+    twin = rectangle(0, 0, 48, 16)
+    cuts = Cuts.of([2, 3, 4], 2, [None, a, b, c, d], PART)
+    rest, mine = [True] * 5, [True] * 5
+    stack = [None, a, b, c, d]
+    assert cuts.apart(2, stack, rest, mine) == NOTHING
+    assert cuts.apart(2, [None, a, b, twin, d], rest, mine) == NOTHING
+    assert cuts.apart(2, stack, [*rest[:3], False, True], mine) == Apart(frozenset([c]))
+    assert cuts.apart(2, stack[:4], rest[:4], mine[:4]) == Apart(frozenset([d]))
+    behind = ((a, True), (None, False))
+    assert cuts.apart(2, stack, [False, *rest[1:]], mine) == Apart(behind=behind)
+    moved = [False, False, *rest[2:]]
+    assert cuts.apart(2, stack, moved, [True, False, *mine[2:]]) == Apart(behind=behind[1:])
+    assert cuts.apart(2, stack, moved, [False, False, *mine[2:]]) == NOTHING
+    assert cuts.apart(2, [None, a, a, c, d], rest, mine) == Apart(behind=GONE)
+    fronts = Cuts.of([3, 4], 2, stack, PART)
+    assert fronts.apart(2, [None, a, a, c, d], moved, mine) == NOTHING
 
 
 @pytest.mark.parametrize("size", [(21, 18), (1, 1), (1, 6), (7, 2), (5, 5)])
@@ -184,8 +228,8 @@ def test_a_mask_instead_has_the_cells_that_are_kept_as_a_whole(size, there):
     box = (0, 0, *size)
     disc = Boundary(UNIT, (ellipse((2, 2), (2, 2)),))
     texture = view(planes("a", (40, 30)), part=box, cuts=Cuts(None, (disc,), box))
-    left = None, [disc] * there
-    kept, masked = texture.cuts.lasting(*left), texture.masked(*left)
+    apart = NOTHING if there else texture.cuts.everything
+    kept, masked = texture.cuts.kept(apart), texture.masked(apart)
     assert masked.cuts is None
     cells = np.array(
         [[kept[2 * j : 2 * j + 2, 2 * i : 2 * i + 2].all() for i in range(-(-size[0] // 2))]
@@ -193,7 +237,7 @@ def test_a_mask_instead_has_the_cells_that_are_kept_as_a_whole(size, there):
     )  # fmt: skip
     assert cells.all() if masked.mask is None else (masked.mask == cells).all()
     assert masked.cell == (masked.mask is not None)
-    assert masked.masked() is masked
+    assert masked.masked(apart) is masked
 
 
 def test_a_mask_instead_is_never_empty():
@@ -202,12 +246,13 @@ def test_a_mask_instead_is_never_empty():
     small = rectangle(16, 16, 32, 48)
     texture = view(planes("a", (40, 30)), part=box, cuts=Cuts(small, (), box))
     assert texture.cuts.shown.sum() == 2
-    for own in (None, small):
-        assert texture.masked(own).mask.tolist() == [[True, False, False]] * 2
+    for apart in (texture.cuts.everything, NOTHING):
+        assert texture.masked(apart).mask.tolist() == [[True, False, False]] * 2
     line, box = rectangle(16, 0, 32, 64), (0, 0, 2, 4)
     thin = view(planes("a", (40, 30)), part=box, cuts=Cuts(line, (), box))
     assert thin.cuts.shown.tolist() == [[False, True]] * 4
-    assert (thin.masked().mask, thin.masked().cell) == (None, 0)
+    masked = thin.masked(thin.cuts.everything)
+    assert (masked.mask, masked.cell) == (None, 0)
 
 
 def test_numbers():

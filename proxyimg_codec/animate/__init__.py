@@ -1,0 +1,1 @@
+"""Animation: position-based dynamics on the proxy nodes of layers."""

@@ -1,0 +1,70 @@
+"""Frames of a picture that moves, in their order, on several threads."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import UsageError
+from ..image import Image
+
+
+def times(image: Image, *, duration: float | None = None, fps: float | None = None) -> list[float]:
+    """The times of the frames of a clip in seconds.
+
+    Args:
+        image: A picture with a timeline.
+        duration: Seconds; by default those of the timeline.
+        fps: Frames a second; by default those that the timeline was made for.
+
+    Raises:
+        UsageError: The picture does not move, or a number makes no sense.
+    """
+    if image.timeline is None:
+        raise UsageError("the picture does not move; give it a motion first (pxi-animate)")
+    duration = image.timeline.seconds if duration is None else duration
+    fps = image.timeline.fps if fps is None else fps
+    if not (0 < fps <= 240 and 0 < duration <= 3600):
+        raise UsageError(
+            f"{duration:g} s at {fps:g} frames a second: up to 3600 s, and 240 a second"
+        )
+    return [k / fps for k in range(max(round(duration * fps), 1))]
+
+
+def frames(
+    image: Image, at: list[float], *, jobs: int = 2, **options: Any
+) -> Iterator[NDArray[np.uint8]]:
+    """Renders a picture at several times.
+
+    What does not move is rendered once, and shared.
+
+    Args:
+        image: A picture with a timeline.
+        at: Times in seconds.
+        jobs: Threads.
+        options: As of `Image.render`.
+
+    Yields:
+        uint8 [H, W, 3 or 4], one for each time.
+    """
+
+    def render(t: float) -> NDArray[np.uint8]:
+        return np.asarray(image.render(t=t, **options))
+
+    with ThreadPoolExecutor(jobs) as pool:
+        waiting: deque[Future[NDArray[np.uint8]]] = deque()
+        try:
+            for t in at:
+                waiting.append(pool.submit(render, t))
+                if len(waiting) > jobs:
+                    yield waiting.popleft().result()
+            while waiting:
+                yield waiting.popleft().result()
+        finally:
+            for future in waiting:
+                future.cancel()

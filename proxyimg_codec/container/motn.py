@@ -1,0 +1,20 @@
+"""mOTN: how the nodes of layers move over time. A reader that does not know it shows the still."""
+
+from .fields import Field
+
+TYPE = "mOTN"
+
+FIELDS = (
+    Field("duration", "int", "Length of the timeline in milliseconds.", 1, 3_600_000),
+    Field("fps", "int", "Frames a second that it was made for: a hint for export.", 1, 240),
+    Field("loop", "int", "1 = the end of the timeline is its beginning.", 0, 1),
+    Field("intervals", "int", "Equal intervals that the timeline is cut into.", 1, 1 << 16),
+    Field("unit", "int", "Coefficients are multiples of 2^-unit canvas pixels.", 0, 6),
+    Field("layers", "ints", "Ascending numbers of the layers that move; each has a mesh.",
+          0, 1 << 16),
+    Field("classes", "bin", "Coded array [2, coefficients, nodes of these layers] of bit lengths "
+          "of residuals."),
+    Field("deltas", "bin", "Raw bits of the residuals."),
+    Field("size", "int", "Bytes of the script; 0 = none."),
+    Field("script", "bin", "What it was made from, JSON in UTF-8, as one zstd frame."),
+)  # fmt: skip
