@@ -100,6 +100,7 @@ def _unbent_beyond(self: warp.Warp, x: Any, y: Any, face: Any = None) -> warp.Lo
 
 
 def _stopped_at_the_edge(self: warp.Warp, x: Any, y: Any, face: Any = None) -> warp.Located:
+    self._weighing = True
     shown = locate_of(self, x, y, face)
     if face is None or shown.face is None or shown.weights is None:
         return shown

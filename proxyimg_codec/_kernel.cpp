@@ -40,6 +40,7 @@ typedef float vec8 __attribute__((vector_size(32), aligned(4), may_alias));  // 
 
 #include "_kernel_pyramid.h"
 #include "_kernel_synthesis.h"
+#include "_kernel_sample.h"
 
 static const int BLOCK = 256, NV = BLOCK / LANES, PARTS = 4, MAX_LAYERS = 10, SPAN = 32;
 static const float PI = 3.14159265358979f;
@@ -543,6 +544,18 @@ int pxi_pyramid_synthesis(const Synthesis *level) {
     } catch (const std::bad_alloc &) {
         return NO_MEMORY;
     }
+}
+
+// Samples at points, see `sample`; `channels` is 3 or 4.
+void pxi_sample(const float *samples, int64_t stride, int32_t channels, const Points *at, float *out) {
+    if (channels == 3)
+        sample<3>(samples, stride, *at, out);
+    else
+        sample<4>(samples, stride, *at, out);
+}
+
+void pxi_blend(float *result, float *clear, const float *colour, const float *coverage, int64_t n) {
+    blend(result, clear, colour, coverage, n);
 }
 
 // Words that encoding gives, at the back of `words`; see `rans_encode`.

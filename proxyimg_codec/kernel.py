@@ -65,6 +65,12 @@ class Coded(ct.Structure):
     ]
 
 
+class Points(ct.Structure):
+    """Mirrors `struct Points`."""
+
+    _fields_ = [*((n, ct.c_void_p) for n in ("first", "fx", "fy")), ("n", ct.c_int64)]
+
+
 @functools.cache
 def library() -> ct.CDLL | None:
     """The loaded kernel, or None where it was not built or does not load on this machine.
@@ -96,6 +102,12 @@ def library() -> ct.CDLL | None:
             lib.pxi_pyramid_level.argtypes = [ct.c_void_p]
             lib.pxi_pyramid_synthesis.restype = ct.c_int
             lib.pxi_pyramid_synthesis.argtypes = [ct.c_void_p]
+            lib.pxi_sample.restype = None
+            lib.pxi_sample.argtypes = [
+                ct.c_void_p, ct.c_int64, ct.c_int32, ct.POINTER(Points), ct.c_void_p,
+            ]  # fmt: skip
+            lib.pxi_blend.restype = None
+            lib.pxi_blend.argtypes = [*(ct.c_void_p,) * 4, ct.c_int64]
             lib.pxi_rans_encode.restype = ct.c_int64
             lib.pxi_rans_encode.argtypes = [
                 ct.c_void_p, ct.c_void_p, ct.c_void_p, ct.c_int64, ct.c_int32, ct.c_int32,
@@ -145,6 +157,52 @@ def forward(
         ct.byref(net), pointer(codes), pointer(weights), ct.byref(entries), len(base), pointer(out)
     )
     return out
+
+
+def sample(
+    samples: NDArray[np.float32],
+    first: NDArray[np.int32],
+    fx: NDArray[np.float32],
+    fy: NDArray[np.float32],
+) -> NDArray[np.float32]:
+    """Interpolates at points, as `texture.pyramid` does in numpy: [N, C].
+
+    Args:
+        samples: [h, w, C], C being 3 or 4.
+        first: Number of the sample up and left of the four by four that count, of each point [N].
+        fx: Horizontal fractions [N] in 0..1.
+        fy: Vertical fractions.
+    """
+    lib = library()
+    assert lib is not None, "check available() first"
+    _, stride, channels = samples.shape
+    out = np.empty((len(first), channels), np.float32)
+    at = Points(pointer(first), pointer(fx), pointer(fy), len(first))
+    lib.pxi_sample(pointer(samples), stride, channels, ct.byref(at), pointer(out))
+    return out
+
+
+def blend(
+    result: NDArray[np.float32],
+    clear: NDArray[np.float32],
+    colour: NDArray[np.float32],
+    coverage: NDArray[np.float32] | None,
+) -> None:
+    """Puts colours behind what is there, as `render.compose` does in numpy.
+
+    Args:
+        result: [N, 4] premultiplied colour and alpha; what is there.
+        clear: [N] what that lets through.
+        colour: [N, 4] premultiplied.
+        coverage: [N] in 0..1, or None for 1.
+    """
+    lib = library()
+    assert lib is not None, "check available() first"
+    arrays = (result, clear, colour) if coverage is None else (result, clear, colour, coverage)
+    if any(a.dtype != np.float32 for a in arrays):
+        raise ValueError("the kernel takes float32 only")
+    covered = None if coverage is None else pointer(coverage)
+    lib.pxi_blend(pointer(result), pointer(clear), pointer(colour), covered, len(result))
 
 
 def decode(

@@ -105,7 +105,7 @@ def _motion(image: Image) -> dict[str, Any] | None:
     line = image.timeline
     if line is None or not moving:
         return None
-    classes, raw = tracks.encode([(track, mesh.refined) for _, track, mesh in moving])
+    curves, shapes = tracks.encode([(track, mesh.refined) for _, track, mesh in moving])
     script = line.script.encode()
     return {
         "duration": line.duration,
@@ -114,8 +114,11 @@ def _motion(image: Image) -> dict[str, Any] | None:
         "intervals": line.intervals,
         "unit": line.unit,
         "layers": [i for i, _, _ in moving],
-        "classes": classes,
-        "deltas": raw,
+        "modes": len(moving[0][1].curves),
+        "curve_classes": curves[0],
+        "curve_deltas": curves[1],
+        "shape_classes": shapes[0],
+        "shape_deltas": shapes[1],
         "size": len(script),
         "script": meta.compressed(script) if script else b"",
     }
@@ -197,7 +200,9 @@ def _moving(
         fields["duration"], fields["fps"], bool(fields["loop"]), fields["intervals"],
         fields["unit"], text,
     )  # fmt: skip
-    found = tracks.decode(
-        fields["classes"], fields["deltas"], timeline, [meshes[n].refined for n in numbers], where
+    curves, shapes = (
+        (fields[f"{name}_classes"], fields[f"{name}_deltas"]) for name in ("curve", "shape")
     )
+    refined = [meshes[n].refined for n in numbers]
+    found = tracks.decode(curves, shapes, fields["modes"], timeline, refined, where)
     return timeline, dict(zip(numbers, found, strict=True))

@@ -14,7 +14,19 @@ from pathlib import Path
 
 import numpy as np
 
-from proxyimg_codec.container import head, layr, mesh, meta, motn, netw, plan, pose, texr, tree, undo
+from proxyimg_codec.container import (
+    head,
+    layr,
+    mesh,
+    meta,
+    motn,
+    netw,
+    plan,
+    pose,
+    texr,
+    tree,
+    undo,
+)
 from proxyimg_codec.container.fields import Field
 from proxyimg_codec.entropy import arrays
 from proxyimg_codec.geometry import deltas

@@ -329,7 +329,7 @@ def test_program_finds_texture_points(program, seed):
     fields, there = fields_of(posed, made), decoded(program, made)
     moves, places = as_lists(posed.nodes), as_lists(posed.places)
     locate = program["chart"](fields, moves, places, there, posed.bent)
-    chart = warp.Warp(posed, made)
+    chart = warp.Warp(posed, made, posed.bent)
     y, x = (v.ravel() for v in np.mgrid[0:12, 0:16] + 0.5)
     grid = np.zeros(2), np.ones(2), (0, 0, 16, 12)
     shown = chart.locate(x, y, chart.faces(*grid).ravel() if posed.bent else None)

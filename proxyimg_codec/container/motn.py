@@ -9,12 +9,16 @@ FIELDS = (
     Field("fps", "int", "Frames a second that it was made for: a hint for export.", 1, 240),
     Field("loop", "int", "1 = the end of the timeline is its beginning.", 0, 1),
     Field("intervals", "int", "Equal intervals that the timeline is cut into.", 1, 1 << 16),
-    Field("unit", "int", "Coefficients are multiples of 2^-unit canvas pixels.", 0, 6),
+    Field("unit", "int", "Shapes are multiples of 2^-unit canvas pixels.", 0, 6),
     Field("layers", "ints", "Ascending numbers of the layers that move; each has a mesh.",
           0, 1 << 16),
-    Field("classes", "bin", "Coded array [2, coefficients, nodes of these layers] of bit lengths "
-          "of residuals."),
-    Field("deltas", "bin", "Raw bits of the residuals."),
+    Field("modes", "int", "Curves and shapes of each of these layers.", 1, 64),
+    Field("curve_classes", "bin", "Coded array [modes, 1, layers times coefficients] of bit "
+          "lengths of steps of the curves."),
+    Field("curve_deltas", "bin", "Raw bits of the steps."),
+    Field("shape_classes", "bin", "Coded array [2, modes, nodes of these layers] of bit lengths "
+          "of residuals of the shapes."),
+    Field("shape_deltas", "bin", "Raw bits of the residuals."),
     Field("size", "int", "Bytes of the script; 0 = none."),
     Field("script", "bin", "What it was made from, JSON in UTF-8, as one zstd frame."),
 )  # fmt: skip

@@ -1,8 +1,10 @@
-"""How the nodes of a layer move: cubic B-splines over time, in whole numbers.
+"""How the nodes of a layer move: a few shapes, each with a curve over time, in whole numbers.
 
-A timeline is cut into equal intervals. The displacement of a node is a uniform cubic B-spline of
-them, so that it is smooth, can be found at any time from four coefficients, and closes where the
-timeline loops (de Boor 1978, "A Practical Guide to Splines").
+A timeline is cut into equal intervals. A curve is a uniform cubic B-spline of them, so that it is
+smooth, can be found at any time from four coefficients, and closes where the timeline loops
+(de Boor 1978, "A Practical Guide to Splines"). A shape displaces every node; what nodes do is the
+sum of shapes times curves, as few of each say nearly all (Alexa, Mueller 2000, "Representing
+Animations by Principal Components").
 """
 
 from __future__ import annotations
@@ -25,8 +27,16 @@ PHASE_BITS = 10
 
 MICROSECONDS = 1_000_000
 
-COEFFICIENT_MAX = 1 << 20
-"""Coefficients are below this; with a unit of 1/8 px that is 131,072 px."""
+CURVE_BITS = 8
+"""Coefficients of curves are in 2**-CURVE_BITS."""
+
+CURVE_MAX, SHAPE_MAX = 1 << 15, 1 << 20
+"""Coefficients of curves, and displacements of shapes, are below these."""
+
+MODES_MAX = 64
+
+_VALUE_BITS = 16
+"""Values of curves are in 2**-_VALUE_BITS."""
 
 _ONE = 1 << PHASE_BITS
 SUM = 6 << (3 * PHASE_BITS)
@@ -42,7 +52,7 @@ class Timeline:
         fps: Frames a second that it was made for, 1..240.
         loop: Whether its end is its beginning.
         intervals: Number of equal intervals that it is cut into.
-        unit: Coefficients are multiples of 2**-unit canvas pixels.
+        unit: Shapes are multiples of 2**-unit canvas pixels.
         script: What it was made from, as JSON (`animate.motion`), or "".
     """
 
@@ -60,7 +70,7 @@ class Timeline:
 
     @property
     def coefficients(self) -> int:
-        """Coefficients of a node: those of a loop go round."""
+        """Coefficients of a curve: those of a loop go round."""
         return self.intervals if self.loop else self.intervals + 3
 
     @property
@@ -103,13 +113,15 @@ def weights(phase: int) -> Ints:
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """Displacements of all nodes of a layer over a timeline.
+    """How the nodes of a layer move over a timeline.
 
     Attributes:
-        coefficients: int64 [K, N, 2] in units of the timeline.
+        curves: int64 [M, K] coefficients of M curves, in 2**-CURVE_BITS.
+        shapes: int64 [M, N, 2] displacements of all nodes in units of the timeline.
     """
 
-    coefficients: Ints
+    curves: Ints
+    shapes: Ints
 
     def at(self, timeline: Timeline, seconds: float) -> Ints:
         """Displacements int64 [N, 2] in 1/1024 canvas pixel at a time; exact, half up.
@@ -118,39 +130,49 @@ class Track:
             UsageError: The time is not a number.
         """
         index, weight = timeline.taps(seconds)
-        total = (weight[:, None, None] * self.coefficients[index]).sum(0)
-        scaled: Ints = ((total << (FRACTION_BITS - timeline.unit)) + SUM // 2) // SUM
-        return scaled
+        total = self.curves[:, index] @ weight << (_VALUE_BITS - CURVE_BITS)
+        values = (total + SUM // 2) // SUM
+        moved = np.tensordot(values, self.shapes, 1) << (FRACTION_BITS - timeline.unit)
+        return np.asarray((moved + (1 << (_VALUE_BITS - 1))) >> _VALUE_BITS)
 
 
-def encode(tracks: list[tuple[Track, Refined]]) -> tuple[bytes, bytes]:
-    """Classes and deltas of the coefficients of several layers: signed integers [2, K, nodes].
+Coded = tuple[bytes, bytes]
+"""Classes and deltas of an array of signed integers."""
 
-    Nodes are predicted from others at the same coefficient, as in POSE.
-    """
-    parts = []
+
+def encode(tracks: list[tuple[Track, Refined]]) -> tuple[Coded, Coded]:
+    """Curves [M, layers * K] less the coefficient before; shapes [2, M, nodes] as in POSE."""
+    curves, shapes = [], []
     for track, refined in tracks:
-        count, nodes, _ = track.coefficients.shape
-        flat = track.coefficients.transpose(1, 0, 2).reshape(nodes, 2 * count)
-        parts.append(residuals(flat, refined).reshape(nodes, count, 2).transpose(2, 1, 0))
-    return deltas.encode(np.concatenate(parts, axis=2))
+        curves.append(np.diff(track.curves, axis=1, prepend=0))
+        modes, nodes, _ = track.shapes.shape
+        flat = track.shapes.transpose(1, 0, 2).reshape(nodes, 2 * modes)
+        shapes.append(residuals(flat, refined).reshape(nodes, modes, 2).transpose(2, 1, 0))
+    return deltas.encode(np.concatenate(curves, 1)), deltas.encode(np.concatenate(shapes, 2))
 
 
 def decode(
-    classes: bytes, raw: bytes, timeline: Timeline, meshes: list[Refined], where: str
+    curves: Coded, shapes: Coded, modes: int, timeline: Timeline, meshes: list[Refined], where: str
 ) -> list[Track]:
     """Inverse of `encode`.
 
     Raises:
-        FormatError: Corrupt streams, or a coefficient that is out of range.
+        FormatError: Corrupt streams, or a number that is out of range.
     """
-    count, nodes = timeline.coefficients, [len(m.nodes) for m in meshes]
-    whole = deltas.decode(classes, raw, 2, sum(nodes), where, count).reshape(2, count, -1)
+    steps = deltas.decode(*curves, modes, len(meshes) * timeline.coefficients, where)
+    nodes = [len(m.nodes) for m in meshes]
+    whole = deltas.decode(*shapes, 2, sum(nodes), where, modes).reshape(2, modes, -1)
     tracks = []
-    for part, refined in zip(np.split(whole, np.cumsum(nodes)[:-1], axis=2), meshes, strict=True):
-        flat = part.transpose(2, 1, 0).reshape(len(refined.nodes), 2 * count)
-        values = restored(flat, refined)
-        if np.abs(values).max() >= COEFFICIENT_MAX:
-            raise FormatError("a coefficient is out of range", where)
-        tracks.append(Track(values.reshape(-1, count, 2).transpose(1, 0, 2)))
+    for curve, part, refined in zip(
+        np.split(steps, len(meshes), axis=1),
+        np.split(whole, np.cumsum(nodes)[:-1], axis=2),
+        meshes,
+        strict=True,
+    ):
+        flat = part.transpose(2, 1, 0).reshape(len(refined.nodes), 2 * modes)
+        shape = restored(flat, refined).reshape(-1, modes, 2).transpose(1, 0, 2)
+        curve = np.cumsum(curve, axis=1)
+        if np.abs(curve).max() >= CURVE_MAX or np.abs(shape).max() >= SHAPE_MAX:
+            raise FormatError("a curve or shape is out of range", where)
+        tracks.append(Track(curve, shape))
     return tracks

@@ -203,7 +203,7 @@ class Warp:
     Args:
         pose: The layer's.
         mesh: Its mesh; consulted if the pose is bent or `meshed`.
-        meshed: Whether faces and weights are wanted in any case.
+        meshed: Whether faces are wanted in any case, and weights too.
         limits: Bounds how often samples may be covered, and how many may lie beyond the mesh.
     """
 
@@ -225,7 +225,6 @@ class Warp:
         if pose.places is not None:
             shown = shown + pose.places / (1 << NODE_BITS)
         self._corners = present[refined.faces]
-        # Relative to the sample, so that what did not move stays exactly where it was.
         offset = (shown - present)[refined.faces]
         a, b, c = (self._corners[:, i] for i in range(3))
         ab, ac = b - a, c - a
@@ -236,9 +235,15 @@ class Warp:
         # Weights of b and c at a point p are linear in p - a.
         self._second = np.stack([ac[:, 1], -ac[:, 0]], 1) / safe
         self._third = np.stack([-ab[:, 1], ab[:, 0]], 1) / safe
-        self._base, self._to_b, self._to_c = (
-            offset[:, 0], offset[:, 1] - offset[:, 0], offset[:, 2] - offset[:, 0],
-        )  # fmt: skip
+        to_b, to_c = offset[:, 1] - offset[:, 0], offset[:, 2] - offset[:, 0]
+        # How far from p the point lies that it shows is affine in p, in each face. As it is a
+        # distance, what did not move stays exactly where it was.
+        by_x, by_y = (
+            to_b * self._second[:, k, None] + to_c * self._third[:, k, None] for k in (0, 1)
+        )
+        start = offset[:, 0] - by_x * a[:, :1] - by_y * a[:, 1:]
+        self._away = [np.ascontiguousarray(v[:, k]) for k in (0, 1) for v in (start, by_x, by_y)]
+        self._weighing = meshed
 
     @property
     def meshed(self) -> bool:
@@ -274,16 +279,16 @@ class Warp:
         assert face is not None, "a meshed layer needs the faces of its samples"
         at = face.astype(np.int64)
         lost = np.flatnonzero(at < 0)
-        points = np.stack([x, y], axis=1)
+        points = np.stack([x, y], axis=1) if len(lost) or self._weighing else np.empty((0, 2))
         self._beyond += len(lost) * len(self._centres)
         self._limits.check("beyond", self._beyond)
         at[lost] = nearest(points[lost], self._centres)
+        start_x, x_by_x, x_by_y, start_y, y_by_x, y_by_y = (v.take(at) for v in self._away)
+        shown_x = x + (start_x + x_by_x * x + x_by_y * y)
+        shown_y = y + (start_y + y_by_x * x + y_by_y * y)
+        if not self._weighing:
+            return Located(shown_x, shown_y, at)
         away = points - self._corners[at, 0]
         second = (self._second[at] * away).sum(1)
         third = (self._third[at] * away).sum(1)
-        shown = (
-            points + self._base[at]
-            + second[:, None] * self._to_b[at] + third[:, None] * self._to_c[at]
-        )  # fmt: skip
-        weights = np.stack([1 - second - third, second, third], axis=1)
-        return Located(shown[:, 0], shown[:, 1], at, weights)
+        return Located(shown_x, shown_y, at, np.stack([1 - second - third, second, third], axis=1))

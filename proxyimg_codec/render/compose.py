@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import kernel
 from ..geometry import coverage as cover
 from ..geometry.boundary import Boundary
 from ..geometry.mesh import FRACTION_BITS
@@ -66,18 +67,20 @@ def _tile(painters: Sequence[_Painter], box: Rectangle) -> Floats:
     """Samples [h, w, 4], premultiplied, of the sample rectangle `box` = x, y, w, h."""
     _, _, w, h = box
     result = np.zeros((h * w, 4), np.float32)
-    shown = np.empty_like(result)
     clear = np.ones(h * w, np.float32)
     for painter in painters:
         sheet = painter.sheet(box)
         rows = slice(sheet.start, sheet.stop)
         covered = np.float32(1) if sheet.coverage is None else sheet.coverage
-        weight = clear[rows] * covered
-        fresh = np.flatnonzero((weight > 0) & ~sheet.known)
+        fresh = np.flatnonzero((clear[rows] * covered > 0) & ~sheet.known)
         if len(fresh):
             painter.paint(sheet, box, fresh)
         colour = painter.posed(sheet.colour)
-        result[rows] += np.multiply(weight[:, None], colour, out=shown[rows])
+        if painter.native:
+            kernel.blend(result[rows], clear[rows], colour, sheet.coverage)
+            continue
+        weight = clear[rows] * covered
+        result[rows] += weight[:, None] * colour
         clear[rows] *= 1 - covered * colour[:, 3]
     return result.reshape(h, w, 4)
 
@@ -89,6 +92,7 @@ class _Painter:
         self._image, self._layer, self._view = image, layer, view
         self._engine = engine
         self._run = engines.find(engine)
+        self.native = self._run is engines.run_native
         self._paths = outline(layer.outline, view)
         self._warp = Warp(layer.pose, layer.mesh, layer.sampling in (1, 2), limits)
         sx, sy = view.supersampling
@@ -113,7 +117,7 @@ class _Painter:
         covered = cover.coverage(self._paths, *box)
         seen = np.flatnonzero(covered.max(1))  # faster than any(1)
         first, last = (int(seen[0]), int(seen[-1]) + 1) if len(seen) else (0, 0)
-        share = covered[first:last].ravel() * np.float32(1 / cover.FULL)
+        share = covered[first:last].ravel().astype(np.float32) / np.float32(cover.FULL)
         return cache.Sheet(share, first * w, last * w)
 
     def _key(self, box: Rectangle) -> Hashable:
@@ -159,7 +163,9 @@ class _Painter:
         shown = self._warp.locate(x, y, face)
         texture = layer.texture
         if isinstance(texture, PyramidTexture):
-            return premultiplied(texture.sample(shown.x, shown.y, layer.box, layer.apart))
+            return premultiplied(
+                texture.sample(shown.x, shown.y, layer.box, layer.apart, self.native)
+            )
         if layer.sampling:
             return premultiplied(_at_nodes(self._image, layer, texture, shown))
         network = self._image.networks[texture.network]

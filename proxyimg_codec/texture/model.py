@@ -23,7 +23,7 @@ MAGIC = b"PXIMODL1"
 LEVEL_SETS = 4
 """Weights of levels 1, 2, 3, and of all coarser ones."""
 
-REGISTERED = {1: "5e77e94c333fea4387caab28f7512a6dabac7b59eee41f137d1b4dfae98d75fd"}
+REGISTERED = {1: "91e24c9aca7764cc60f13d481e139d4a1ef71bbe6cffe0b1f3850315bb2d0934"}
 """SHA-256 of the file of each model."""
 
 STEP_ORIGIN = 293

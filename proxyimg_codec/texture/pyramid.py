@@ -15,6 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import kernel
 from ..container import texr
 from ..entropy import arrays
 from ..errors import FormatError
@@ -137,7 +138,12 @@ class PyramidTexture:
         return np.ascontiguousarray(np.moveaxis(out, 0, 2)).reshape(-1, len(out))
 
     def sample(
-        self, x: NDArray[np.float64], y: NDArray[np.float64], box: Box, apart: Apart = NOTHING
+        self,
+        x: NDArray[np.float64],
+        y: NDArray[np.float64],
+        box: Box,
+        apart: Apart = NOTHING,
+        native: bool = False,
     ) -> Floats:
         """Colours [N, `channels`] at canvas points x, y [N], premultiplied, not clamped.
 
@@ -149,35 +155,45 @@ class PyramidTexture:
             y: Canvas y.
             box: The layer's rectangle.
             apart: What `cuts` have lost.
+            native: Whether to use the compiled kernel.
 
         Raises:
             FormatError: The planes are corrupt.
         """
         column, fx = _position(x, box[0], box[2], self.part[2])
         row, fy = _position(y, box[1], box[3], self.part[3])
-        kept = self.kept(apart)
         if not (fx.any() or fy.any()):
-            return self._samples(row, column, kept)
+            return self._samples(row, column, self.kept(apart))
+        padded = self._padded(apart)
+        first = row * padded.shape[1] + column
+        if native:
+            return kernel.sample(padded, first.astype(np.int32), fx, fy)
         out = np.empty((len(x), self.channels(())), np.float32)
         for i in range(0, len(x), CHUNK):
             at = slice(i, i + CHUNK)
-            out[at] = self._interpolated(row[at], column[at], fy[at], fx[at], kept)
+            out[at] = _interpolated(padded, first[at], fx[at], fy[at])
         return out
 
-    def _interpolated(
-        self, row: NDArray[np.intp], column: NDArray[np.intp], fy: Floats, fx: Floats,
-        kept: Samples | None,
-    ) -> Floats:  # fmt: skip
-        """Colours of points at fractions fy, fx behind the samples of rows and columns."""
-        _, _, width, height = self.part
-        across, down = _weights(fx), _weights(fy)
-        total = np.zeros((len(row), self.channels(())), np.float32)
-        for j in range(TAPS):
-            below = np.clip(row + (j - 1), 0, height - 1)
-            for i in range(TAPS):
-                aside = np.clip(column + (i - 1), 0, width - 1)
-                total += (down[j] * across[i])[:, None] * self._samples(below, aside, kept)
-        return total
+    def _padded(self, apart: Apart) -> Floats:
+        """All premultiplied samples, with the edge repeated once before and twice behind."""
+        found = self._last.get(apart)
+        if found is None:
+            _, _, width, height = self.part
+            rows, columns = (
+                np.clip(np.arange(-1, n + 2), 0, n - 1).astype(np.intp) for n in (height, width)
+            )
+            kept = self.kept(apart)
+            found = np.empty((len(rows), len(columns), self.channels(())), np.float32)
+            for row, out in zip(rows, found, strict=True):
+                out[:] = self._samples(np.full_like(columns, row), columns, kept)
+            # What is apart stays so while layers move: the last one is enough.
+            self._last.clear()
+            self._last[apart] = found
+        return found
+
+    @cached_property
+    def _last(self) -> dict[Apart, Floats]:
+        return {}
 
     def _samples(
         self, row: NDArray[np.intp], column: NDArray[np.intp], kept: Samples | None
@@ -203,6 +219,19 @@ class PyramidTexture:
 
 
 Texture = ImplicitTexture | PyramidTexture
+
+
+def _interpolated(padded: Floats, first: NDArray[np.intp], fx: Floats, fy: Floats) -> Floats:
+    """Colours [n, C] at fractions fx, fy [n] from the four by four samples after `first` [n]."""
+    samples = padded.reshape(-1, padded.shape[2])
+    across, down = _weights(fx), _weights(fy)
+    total = np.zeros((len(first), samples.shape[1]), np.float32)
+    for j in range(TAPS):
+        part = np.zeros_like(total)
+        for i in range(TAPS):
+            part += across[i][:, None] * samples.take(first + (j * padded.shape[1] + i), 0)
+        total += down[j][:, None] * part
+    return total
 
 
 def _position(

@@ -40,50 +40,62 @@ def test_weights_are_those_of_the_spline(phase):
 
 
 @given(st.floats(-20, 20), st.sampled_from([LOOP, ONCE]))
-def test_displacements_are_those_of_the_spline(seconds, timeline):
+def test_displacements_are_those_of_the_splines(seconds, timeline):
     rng = np.random.default_rng(3)
-    values = rng.integers(-400, 400, (timeline.coefficients, 4, 2))
+    curves = rng.integers(-256, 257, (3, timeline.coefficients))
+    shapes = rng.integers(-200, 200, (3, 4, 2))
     t = seconds % 2 if timeline.loop else min(max(seconds, 0), 2)
     at = t / 2 * timeline.intervals
-    want = np.zeros((4, 2))
+    values = np.zeros(3)
     for k in range(-4, timeline.intervals + 8):
         if timeline.loop or 0 <= k < timeline.coefficients:
-            want += basis(at + 1 - k) * values[k % timeline.coefficients] / 8
-    got = Track(values).at(timeline, seconds) / 1024
-    # A phase is a 1024th of an interval; 400 / 8 px an interval is the fastest.
-    np.testing.assert_allclose(got, want, atol=0.2)
+            values += basis(at + 1 - k) * curves[:, k % timeline.coefficients] / 256
+    got = Track(curves, shapes).at(timeline, seconds) / 1024
+    # A phase is a 1024th of an interval, in which a curve changes by 2 at most.
+    np.testing.assert_allclose(got, np.tensordot(values, shapes / 8, 1), atol=0.2)
 
 
 def test_loops_close_and_others_stay_at_their_ends():
-    values = np.random.default_rng(1).integers(-90, 90, (11, 5, 2))
-    loop, once = Track(values[:8]), Track(values)
+    rng = np.random.default_rng(1)
+    curves, shapes = rng.integers(-256, 257, (2, 11)), rng.integers(-90, 90, (2, 5, 2))
+    loop, once = Track(curves[:, :8], shapes), Track(curves, shapes)
     np.testing.assert_array_equal(loop.at(LOOP, 0), loop.at(LOOP, 2))
     np.testing.assert_array_equal(loop.at(LOOP, 0.3), loop.at(LOOP, -5.7))
     np.testing.assert_array_equal(once.at(ONCE, 2), once.at(ONCE, 99))
     np.testing.assert_array_equal(once.at(ONCE, 0), once.at(ONCE, -1))
-    assert np.abs(once.at(ONCE, 2) - once.at(ONCE, 1.999)).max() < 128
+    assert np.abs(once.at(ONCE, 2) - once.at(ONCE, 1.999)).max() < 256
 
 
 @pytest.mark.parametrize("timeline", [LOOP, ONCE])
-def test_coefficients_survive_coding(timeline):
+def test_tracks_survive_coding(timeline):
     rng = np.random.default_rng(2)
     nodes = refined()
     tracks = [
-        Track(rng.integers(-high, high, (timeline.coefficients, len(nodes.nodes), 2)))
-        for high in (3, 70000)
+        Track(
+            rng.integers(-high, high, (5, timeline.coefficients)),
+            rng.integers(-high, high, (5, len(nodes.nodes), 2)),
+        )
+        for high in (3, 30000)
     ]
-    classes, raw = track.encode([(t, nodes) for t in tracks])
-    again = track.decode(classes, raw, timeline, [nodes, nodes], "here")
+    again = track.decode(*track.encode([(t, nodes) for t in tracks]), 5, timeline, [nodes] * 2, "")
     for a, b in zip(tracks, again, strict=True):
-        np.testing.assert_array_equal(a.coefficients, b.coefficients)
+        np.testing.assert_array_equal(a.curves, b.curves)
+        np.testing.assert_array_equal(a.shapes, b.shapes)
 
 
-def test_coefficients_that_are_too_large_are_refused():
+@pytest.mark.parametrize(("curve", "shape"), [(track.CURVE_MAX, 0), (0, -track.SHAPE_MAX)])
+def test_numbers_that_are_too_large_are_refused(curve, shape):
     nodes = refined()
-    values = np.full((8, len(nodes.nodes), 2), track.COEFFICIENT_MAX)
-    classes, raw = track.encode([(Track(values), nodes)])
-    with pytest.raises(FormatError, match="here: a coefficient"):
-        track.decode(classes, raw, LOOP, [nodes], "here")
+    wrong = Track(np.full((1, 8), curve), np.full((1, len(nodes.nodes), 2), shape))
+    with pytest.raises(FormatError, match="here: a curve or shape is out of range"):
+        track.decode(*track.encode([(wrong, nodes)]), 1, LOOP, [nodes], "here")
+
+
+def test_the_largest_numbers_do_not_overflow():
+    high = Track(np.full((64, 8), track.CURVE_MAX - 1), np.full((64, 1, 2), track.SHAPE_MAX - 1))
+    got = high.at(Timeline(1, 1, True, 8, 0), 0.0003)
+    want = 64 * (track.CURVE_MAX - 1) * (track.SHAPE_MAX - 1) * 1024 // 256
+    assert (np.abs(got - want) <= want * 1e-6).all()
 
 
 def test_a_time_is_a_number():
@@ -104,10 +116,11 @@ def test_few_coefficients_come_near_the_frames(loop):
     frames = wave(48, loop)
     timeline, (one, two) = bake([frames[:, :4], frames[:, 4:]], fps=24, loop=loop)
     assert timeline.intervals < 20
+    assert len(one.curves) < 8
     assert (timeline.duration, timeline.frames) == (2000, 48)
     for k in range(48):
         got = np.concatenate([p.at(timeline, k / 24) for p in (one, two)]) / 1024
-        assert np.sqrt(((got - frames[k]) ** 2).sum(1).mean()) < 0.25
+        assert np.sqrt(((got - frames[k]) ** 2).sum(1).mean()) < 0.3
 
 
 def test_flung_nodes_are_refused():
@@ -117,4 +130,4 @@ def test_flung_nodes_are_refused():
 
 def test_one_frame():
     timeline, (only,) = bake([wave(1, True)], fps=24, loop=True)
-    np.testing.assert_allclose(only.at(timeline, 0) / 1024, wave(1, True)[0], atol=0.07)
+    np.testing.assert_allclose(only.at(timeline, 0) / 1024, wave(1, True)[0], atol=0.2)

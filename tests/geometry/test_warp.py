@@ -115,7 +115,7 @@ def test_a_bend_is_undone_by_the_texture(shape, mesh):
     rng = np.random.default_rng(0)
     refined = mesh.refined
     bent = Pose(nodes=rng.integers(-24, 24, refined.nodes.shape))
-    chart = Warp(bent, mesh)
+    chart = Warp(bent, mesh, True)
     present = bent.present(refined) / 1024
     rest = refined.nodes / 1024
     faces = rng.integers(0, len(refined.faces), 40)

@@ -1,0 +1,292 @@
+"""Motion as data: what moves in a picture, of what, driven by what; reads and writes JSON.
+
+The JSON schema is `motion.schema.json` beside this module. Lengths are canvas pixels with y down,
+times are seconds.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError, UsageError
+from . import presets
+from .materials import MATERIALS, Material
+from .parts import (
+    Attachment,
+    Collide,
+    Disc,
+    Handle,
+    Impulse,
+    Key,
+    LayerMotion,
+    Pair,
+    Rectangle,
+    Spot,
+    Wind,
+)
+from .presets import PRESETS, Box
+from .schema import check
+
+__all__ = ["PRESETS", "Attachment", "Box", "Collide", "Disc", "Handle", "Impulse", "Key",
+           "LayerMotion", "Motion", "Rectangle", "Spot", "Wind", "preset"]  # fmt: skip
+
+STEPS_MAX = 100_000
+"""Most steps of the simulation in the duration of a motion."""
+
+RATE_MIN = 96
+"""Steps a second that are made at least, however few frames a second are asked for."""
+
+_FREE = Collide()
+
+
+@dataclass(frozen=True)
+class Motion:
+    """How a picture moves.
+
+    Attributes:
+        layers: Layers by name; ``*`` is every layer that is not named.
+        duration: Length, or period of the loop, in seconds.
+        fps: Frames a second.
+        loop: Whether the last frame leads to the first; impulses and handles then repeat.
+        seed: Of the wind.
+        substeps: Steps of the simulation a frame, at least; 96 a second are always made.
+        gravity: Acceleration in pixels a second squared.
+        drag: Rate at which air takes speed away, 1/s, besides that of the materials.
+        wind: Or None.
+        collide: What collides.
+        attachments: What holds layers together.
+
+    Raises:
+        UsageError: Something is out of range or makes no sense; the error names the place.
+    """
+
+    layers: Mapping[str, LayerMotion]
+    duration: float = 4.0
+    fps: int = 24
+    loop: bool = True
+    seed: int = 0
+    substeps: int = 4
+    gravity: Pair = (0.0, 0.0)
+    drag: float = 0.5
+    wind: Wind | None = None
+    collide: Collide = _FREE
+    attachments: tuple[Attachment, ...] = ()
+
+    def __post_init__(self) -> None:
+        check(self.to_dict())
+        _check_times(self)
+        if self.wind and not any(self.wind.direction):
+            raise UsageError("wind.direction: 0, 0 points nowhere")
+        for i, a in enumerate(self.attachments):
+            if a.layers[0] == a.layers[1]:
+                raise UsageError(f"attachments[{i}].layers: {a.layers[0]!r} is named twice")
+
+    @property
+    def frames(self) -> int:
+        """Number of frames, at least 1."""
+        return max(1, round(self.duration * self.fps))
+
+    @property
+    def steps(self) -> int:
+        """Steps of the simulation in a frame."""
+        return max(self.substeps, math.ceil(RATE_MIN / self.fps))
+
+    @property
+    def period(self) -> float:
+        """What the frames last, in seconds."""
+        return self.frames / self.fps
+
+    @staticmethod
+    def read(path: str | Path, boxes: Mapping[str, Box] | None = None) -> Motion:
+        """Reads a motion.json.
+
+        Args:
+            path: The file.
+            boxes: As in `from_json`.
+
+        Raises:
+            InputError: The file cannot be read.
+            UsageError: It is no motion; the error names file and place.
+        """
+        try:
+            text = Path(path).read_text("utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise InputError(f"{path}: cannot be read: {error}") from None
+        try:
+            return Motion.from_json(text, boxes)
+        except UsageError as error:
+            raise UsageError(f"{path}: {error}") from None
+
+    @staticmethod
+    def from_json(text: str, boxes: Mapping[str, Box] | None = None) -> Motion:
+        """The motion that JSON describes.
+
+        Args:
+            text: JSON.
+            boxes: x0, y0, x1, y1 in pixels of the picture's layers by name; needed where the JSON
+                asks for a preset, which fills in whatever is not given.
+
+        Raises:
+            UsageError: It is no JSON, or no motion; the error names the place.
+        """
+        try:
+            values = json.loads(text)
+        except (ValueError, RecursionError) as error:
+            raise UsageError(f"is not valid JSON: {error}") from None
+        check(values)
+        if "preset" in values:
+            values = presets.filled(values, boxes or {})
+            check(values)
+        return _motion(values)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The motion as JSON values; what is as it is by default is left out."""
+        values = _pruned(self)
+        named = {m: name for name, m in MATERIALS.items()}
+        values["layers"] = {}
+        for name, layer in self.layers.items():
+            values["layers"][name] = _pruned(layer)
+            material = named.get(layer.material, asdict(layer.material))
+            values["layers"][name]["material"] = material
+        return {"version": 1, **values}
+
+    def to_json(self) -> str:
+        """The motion as JSON, which `from_json` reads."""
+        return json.dumps(self.to_dict(), indent=1) + "\n"
+
+
+def preset(
+    name: str,
+    layers: Mapping[str, Box],
+    *,
+    duration: float = 4.0,
+    fps: int = 24,
+    loop: bool = True,
+    seed: int = 0,
+    pins: Sequence[Spot] | None = None,
+) -> Motion:
+    """A motion that suits any picture.
+
+    Args:
+        name: One of `PRESETS`.
+        layers: x0, y0, x1, y1 in pixels of the boxes of the layers to move, by name.
+        duration: Length or period in seconds.
+        fps: Frames a second.
+        loop: Whether the last frame leads to the first.
+        seed: Of the wind.
+        pins: What stays, instead of what the preset pins.
+
+    Raises:
+        UsageError: There is no such preset, no layer, or a number is out of range.
+    """
+    common = {"duration": duration, "fps": fps, "loop": loop, "seed": seed}
+    values = presets.preset(name, layers, duration if duration > 0 else 1.0)
+    motion = {"version": 1, **values, **common}
+    if pins is not None:
+        for layer in motion["layers"].values():
+            layer["pins"] = [p if isinstance(p, str) else _lists(asdict(p)) for p in pins]
+    check(motion)
+    return _motion(motion)
+
+
+def _check_times(motion: Motion) -> None:
+    """Checks that all times lie within the duration, and that there are not too many steps."""
+    total = motion.frames * motion.steps
+    if total > STEPS_MAX:
+        raise UsageError(
+            f"duration: {motion.duration:g} s at {motion.fps:g} fps with {motion.steps} substeps "
+            f"are {total} steps; at most {STEPS_MAX} are possible"
+        )
+    for name, layer in motion.layers.items():
+        for i, impulse in enumerate(layer.impulses):
+            if impulse.time >= motion.period:
+                raise UsageError(
+                    f"layers.{name}.impulses[{i}].time: {impulse.time:g} is not before the end "
+                    f"at {motion.period:g} s"
+                )
+        for i, handle in enumerate(layer.handles):
+            _check_keys(handle.keys, motion, f"layers.{name}.handles[{i}].keys")
+
+
+def _check_keys(keys: Sequence[Key], motion: Motion, path: str) -> None:
+    times = [k.time for k in keys]
+    for i in range(1, len(times)):
+        if times[i] <= times[i - 1]:
+            raise UsageError(f"{path}[{i}].time: {times[i]:g} does not come after {times[i - 1]:g}")
+    end = times[0] + motion.period if motion.loop else motion.duration
+    last = len(keys) - 1
+    if times[-1] > end:
+        raise UsageError(f"{path}[{last}].time: {times[-1]:g} is after the end at {end:g} s")
+    same = (keys[-1].offset, keys[-1].scale) == (keys[0].offset, keys[0].scale)
+    if motion.loop and times[-1] == end and not same:
+        raise UsageError(f"{path}[{last}]: a period after the first key it must be equal to it")
+
+
+def _motion(values: Mapping[str, Any]) -> Motion:
+    """The motion of checked JSON values."""
+    kept = {k: _frozen(v) for k, v in values.items() if k not in ("version", "$schema")}
+    for key in ("fps", "seed", "substeps"):  # JSON may write 24.0
+        if key in kept:
+            kept[key] = int(kept[key])
+    for key, kind in {"wind": Wind, "collide": Collide}.items():
+        if key in values:
+            kept[key] = kind(**kept[key])
+    kept["attachments"] = tuple(Attachment(**a) for a in kept.get("attachments", ()))
+    kept["layers"] = {name: _layer(v) for name, v in kept["layers"].items()}
+    return Motion(**kept)
+
+
+def _layer(values: dict[str, Any]) -> LayerMotion:
+    material = values.get("material", "cloth")
+    if isinstance(material, str):
+        material = {"preset": material}
+    base = asdict(MATERIALS[material.get("preset", "cloth")])
+    given = {k: v for k, v in material.items() if k != "preset"}
+    handles = (
+        Handle(**{**h, "keys": tuple(Key(**k) for k in h["keys"])})
+        for h in values.get("handles", ())
+    )
+    return LayerMotion(
+        **{
+            **values,
+            "material": Material(**{**base, **given}),
+            "pins": tuple(_spot(p) for p in values.get("pins", ())),
+            "impulses": tuple(Impulse(**i) for i in values.get("impulses", ())),
+            "handles": tuple(handles),
+        }
+    )
+
+
+def _spot(value: Any) -> Spot:
+    if isinstance(value, str):
+        return value  # type: ignore[return-value]
+    return Rectangle(**value) if "box" in value else Disc(**value)
+
+
+def _frozen(value: Any) -> Any:
+    """JSON values with tuples for lists."""
+    if isinstance(value, list):
+        return tuple(_frozen(v) for v in value)
+    return {k: _frozen(v) for k, v in value.items()} if isinstance(value, dict) else value
+
+
+def _lists(value: Any) -> Any:
+    """JSON values with lists for tuples, without None."""
+    if isinstance(value, list | tuple):
+        return [_lists(v) for v in value]
+    if isinstance(value, dict):
+        return {k: _lists(v) for k, v in value.items() if v is not None}
+    return value
+
+
+def _pruned(item: Any) -> dict[str, Any]:
+    """A dataclass as JSON values without what is as it is by default."""
+    plain = {f.name: f.default for f in fields(item)}
+    kept = {k: v for k, v in asdict(item).items() if getattr(item, k) != plain[k]}
+    pruned: dict[str, Any] = _lists(kept)
+    return pruned

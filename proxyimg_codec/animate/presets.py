@@ -1,0 +1,142 @@
+"""Presets: motions that suit any picture, as the JSON values of a motion.
+
+Everything scales with the layers, so that a picture moves alike at every resolution.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from ..errors import UsageError
+
+Box = tuple[float, float, float, float]
+"""x0, y0, x1, y1 in canvas pixels."""
+
+Values = dict[str, Any]
+
+HOP_HEIGHT, HOP_TIME, HOP_EVERY = 0.1, 0.65, 1.3
+"""Height of a hop relative to the diagonal, its seconds in the air, and from one to the next."""
+
+NUDGE_EVERY = 2.0
+"""Seconds from one nudge of the jelly to the next."""
+
+
+def preset(name: str, boxes: Mapping[str, Box], duration: float) -> Values:
+    """The JSON values of a preset, without the version.
+
+    Args:
+        name: One of `PRESETS`.
+        boxes: Boxes of the layers to move, by name.
+        duration: Of the motion in seconds.
+
+    Raises:
+        UsageError: There is no such preset, or no layer.
+    """
+    if name not in PRESETS:
+        raise UsageError(f"there is no preset {name!r}; there are {', '.join(PRESETS)}")
+    if not boxes:
+        raise UsageError(f"preset {name!r} has no layer to move; name one at least")
+    boxes = {n: (float(a), float(b), float(c), float(d)) for n, (a, b, c, d) in boxes.items()}
+    x0, y0, x1, y1 = zip(*boxes.values(), strict=True)
+    extent = math.hypot(max(x1) - min(x0), max(y1) - min(y0))
+    return PRESETS[name](boxes, max(extent, 1.0), duration)
+
+
+def filled(values: Mapping[str, Any], boxes: Mapping[str, Box]) -> Values:
+    """A motion that names a preset, with what the preset says wherever it says nothing itself.
+
+    Args:
+        values: JSON values of the motion.
+        boxes: Boxes of the picture's layers, by name.
+
+    Raises:
+        UsageError: It names a layer that is not there.
+    """
+    named = values.get("layers", {"*": {}})
+    missing = [n for n in named if n not in boxes and n != "*"]
+    if missing or not boxes:
+        known = ", ".join(map(repr, boxes)) or "none"
+        raise UsageError(f"layers: there is no layer {', '.join(missing)!r}; there are: {known}")
+    chosen = boxes if "*" in named else {n: boxes[n] for n in named}
+    base = preset(values["preset"], chosen, values.get("duration", 4.0))
+    layers = {n: {**v, **named.get(n, named.get("*", {}))} for n, v in base["layers"].items()}
+    merged = {"version": 1, **base, **values, "layers": layers}
+    if "wind" in base or "wind" in values:
+        merged["wind"] = {**base.get("wind", {}), **values.get("wind", {})}
+    del merged["preset"]
+    return merged
+
+
+def _sway(boxes: Mapping[str, Box], extent: float, duration: float) -> Values:
+    """Standing on its feet in the wind."""
+    wind = {"strength": 2.1, "scale": extent, "frequency": 0.35, "gust": 0.85, "across": 0.05}
+    return {"wind": wind, "layers": _each(boxes, "hair", "bottom")}
+
+
+def _breeze(boxes: Mapping[str, Box], extent: float, duration: float) -> Values:
+    """Hanging in a light wind."""
+    wind = {"strength": 2.4, "scale": extent, "frequency": 0.45, "gust": 0.8, "across": 0.3}
+    return {"wind": wind, "layers": _each(boxes, "cloth", "top")}
+
+
+def _wave(boxes: Mapping[str, Box], extent: float, duration: float) -> Values:
+    """A flag on its pole."""
+    wind = {"strength": 1.7, "scale": 0.6 * extent, "frequency": 0.7, "gust": 0.9, "across": 0.9}
+    return {"wind": wind, "layers": _each(boxes, "cloth", "left")}
+
+
+def _flame(boxes: Mapping[str, Box], extent: float, duration: float) -> Values:
+    """Rising and flickering."""
+    wind = {"direction": [0, -1], "strength": 1.2, "scale": extent, "frequency": 1.0,
+            "gust": 0.75, "across": 0.6}  # fmt: skip
+    return {"wind": wind, "layers": _each(boxes, "flame", "bottom")}
+
+
+def _jelly(boxes: Mapping[str, Box], extent: float, duration: float) -> Values:
+    """Nudged from the left and from the right in turn."""
+    nudges = _times(duration, NUDGE_EVERY)
+    layers = _each(boxes, "jelly", "bottom")
+    for name, (x0, y0, x1, y1) in boxes.items():
+        speed = 0.6 * math.hypot(x1 - x0, y1 - y0)
+        layers[name]["impulses"] = [
+            {"time": t, "velocity": [speed * (1 - 2 * (i % 2)), -0.3 * speed]}
+            for i, t in enumerate(nudges)
+        ]
+    return {"layers": layers}
+
+
+def _bounce(boxes: Mapping[str, Box], extent: float, duration: float) -> Values:
+    """Hopping where it stands."""
+    gravity = 8 * HOP_HEIGHT * extent / HOP_TIME**2
+    speed = gravity * HOP_TIME / 2
+    layers = _each(boxes, "jelly", None)
+    for layer in layers.values():
+        layer |= {"material": {"preset": "jelly", "shape": 3.5}, "floor": True}
+        layer["impulses"] = [
+            {"time": t, "velocity": [0, -speed]} for t in _times(duration, HOP_EVERY)
+        ]
+    return {"gravity": [0, gravity], "drag": 0.1, "layers": layers}
+
+
+PRESETS: dict[str, Callable[[Mapping[str, Box], float, float], Values]] = {
+    "sway": _sway,
+    "breeze": _breeze,
+    "jelly": _jelly,
+    "wave": _wave,
+    "bounce": _bounce,
+    "flame": _flame,
+}
+
+
+def _each(boxes: Mapping[str, Box], material: str, pin: str | None) -> dict[str, Values]:
+    """Layers of one material that stay upright, whatever part of them is pinned."""
+    pins = {} if pin is None else {"pins": [pin]}
+    return {name: {"material": material, **pins, "upright": True} for name in boxes}
+
+
+def _times(duration: float, every: float) -> list[float]:
+    """Times of events about `every` seconds apart that divide the duration evenly."""
+    count = min(max(1, round(duration / every)), 1000)
+    return [duration * i / count for i in range(count)]

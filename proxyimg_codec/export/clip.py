@@ -1,0 +1,200 @@
+"""A clip: frames written as a video, an animated picture, numbered PNG files or a sprite sheet.
+
+`clip_target` lists them. Video needs even sides: a last column or row is repeated where one is odd.
+GIF counts time in 1/100 s and WebP in 1/1000 s; there each frame begins at the nearest tick, so
+that errors do not add up.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import math
+import os
+import shutil
+import tempfile
+from collections.abc import Iterable, Iterator
+from fractions import Fraction
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError, UsageError
+from .clip_movies import MOVIES, import_av, movie_of, write_errors
+from .clip_pictures import Numbered, Sheet
+from .clip_target import KINDS, SLOWEST, Target, target_of
+
+__all__ = ["Target", "target_of", "write_clip"]
+
+Frame = NDArray[np.uint8]
+
+DEFAULT_QUALITY = 90
+
+
+def write_clip(
+    path: str,
+    frames: Iterable[Frame],
+    *,
+    fps: float,
+    size: tuple[int, int],
+    alpha: bool,
+    loop: bool = True,
+    sheet: bool = False,
+    quality: int | None = None,
+    background: tuple[int, int, int] = (255, 255, 255),
+) -> int:
+    """Writes a clip; all of it or nothing, whatever happens on the way.
+
+    The target is checked before the first frame is asked for. One frame is held at a time, but
+    that all of a sprite sheet is in memory, and GIF keeps the frames in a temporary file. Equal
+    frames give equal bytes. A sequence of files replaces an older one as a whole: of that, the
+    numbers that follow on the new last one are removed.
+
+    Args:
+        path: See `target_of`; an old file is replaced.
+        frames: uint8 [H, W, 3] or [H, W, 4] with straight alpha, sRGB.
+        fps: Frames a second, 0.01 to 1000; GIF has at most 50, WebP and APNG 90.
+        size: Width and height of the frames in pixels.
+        alpha: The clip is transparent; if not, or if the target is not, frames with alpha are
+            composited over `background`.
+        loop: Repeat for ever, where the file can say so (WebP, GIF, APNG, sprite sheet).
+        sheet: A ``.png`` is a sprite sheet.
+        quality: 0 to 100 for MP4, WebM and WebP, where 100 is lossless WebP; by default 90.
+        background: sRGB colour, 0 to 255.
+
+    Returns:
+        Bytes written.
+
+    Raises:
+        UsageError: The name, rate, size or quality does not suit, or there are no frames.
+        InputError: The target cannot be written.
+        UnsupportedError: PyAV is not installed.
+    """
+    target = target_of(path, sheet)
+    rate = _rate_of(fps, target)
+    if max(size) > KINDS[target.kind].longest_side or min(size) < 1:
+        raise UsageError(f"{path}: a .{target.kind} cannot be {size[0]}x{size[1]} pixels")
+    quality = DEFAULT_QUALITY if quality is None else quality
+    if not 0 <= quality <= 100:
+        raise UsageError(f"quality {quality} is not from 0 to 100")
+    if target.kind in MOVIES:
+        import_av()
+    with _staged(target, path) as stage:
+        ready = _ready(frames, size, alpha and target.alpha_bits > 0, background)
+        first = next(ready, None)
+        if first is None:
+            raise UsageError(f"{path}: there are no frames to write")
+        with _explained(path):
+            coder = _coder_of(target, stage, first, rate, loop, quality)
+        with contextlib.closing(coder):
+            for frame in itertools.chain([first], ready):
+                with _explained(path):
+                    coder.add(frame)
+            with _explained(path):
+                coder.finish()
+        return sum(file.stat().st_size for file in stage.iterdir())
+
+
+class _Coder(Protocol):
+    """Writes frames into files."""
+
+    def add(self, frame: Frame) -> None:
+        """Takes the next frame, uint8 [H, W, 3 or 4], all of one shape."""
+
+    def finish(self) -> None:
+        """Completes the files; there are no more frames."""
+
+    def close(self) -> None:
+        """Lets go of the files; called after success and after failure."""
+
+
+def _coder_of(
+    target: Target, stage: Path, first: Frame, rate: Fraction, loop: bool, quality: int
+) -> _Coder:
+    if target.kind == "frames":
+        return Numbered(target, stage)
+    if target.kind == "sheet":
+        return Sheet(target, stage, rate, loop)
+    return movie_of(target.kind, stage / target.path.name, first, rate, loop, quality)
+
+
+def _rate_of(fps: float, target: Target) -> Fraction:
+    """The fraction meant by a number such as 29.97 or 30000 / 1001."""
+    fastest = KINDS[target.kind].fastest
+    if not (math.isfinite(fps) and SLOWEST <= fps <= fastest):
+        raise UsageError(
+            f"{fps:g} frames a second: {target.path.name} can have {SLOWEST:g} to {fastest}"
+        )
+    return Fraction(fps).limit_denominator(1001)
+
+
+def _ready(
+    frames: Iterable[Frame], size: tuple[int, int], alpha: bool, background: tuple[int, int, int]
+) -> Iterator[Frame]:
+    """Frames with four channels if `alpha`, else three."""
+    for frame in frames:
+        if frame.dtype != np.uint8 or frame.shape not in ((*size[::-1], 3), (*size[::-1], 4)):
+            raise ValueError(f"a frame is {frame.dtype} {frame.shape}, not of size {size}")
+        transparent = frame.shape[2] > 3
+        if transparent and not alpha:
+            weight = frame[..., 3:].astype(np.uint16)
+            mixed = frame[..., :3] * weight + np.array(background, np.uint16) * (255 - weight)
+            frame = ((mixed + 127) // 255).astype(np.uint8)
+        elif alpha and not transparent:
+            frame = np.dstack([frame, np.full_like(frame[..., :1], 255)])
+        yield np.ascontiguousarray(frame)
+
+
+@contextlib.contextmanager
+def _explained(path: str) -> Iterator[None]:
+    """Failures of the system and of FFmpeg name the target."""
+    try:
+        yield
+    except write_errors() as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"{path}: cannot be written: {reason}") from None
+
+
+@contextlib.contextmanager
+def _staged(target: Target, path: str) -> Iterator[Path]:
+    """A folder whose files take their places if all goes well, and vanish if not."""
+    for file in [target.first] + [target.sidecar] * (target.kind == "sheet"):
+        if file.exists() and not file.is_file():
+            raise InputError(f"{file}: exists and is not a file")
+    # A link stays a link: what it points to is replaced.
+    folder = Path(os.path.realpath(target.path)).parent
+    made = target.kind == "frames" and not folder.exists()
+    with _explained(path):
+        if made:
+            folder.mkdir()
+        stage = Path(tempfile.mkdtemp(prefix=".pxi-", dir=folder))
+    try:
+        yield stage
+        with _explained(path):
+            _settle(stage, target)
+    finally:
+        shutil.rmtree(stage, ignore_errors=True)
+        if made:
+            # Only an empty folder goes.
+            with contextlib.suppress(OSError):
+                folder.rmdir()
+
+
+def _settle(stage: Path, target: Target) -> None:
+    """Moves files from the stage to their places."""
+    made = sorted(stage.iterdir())
+    for file in made:
+        with open(file, "rb") as stream:
+            os.fsync(stream.fileno())
+    for file in made:
+        place = Path(os.path.realpath(target.path.with_name(file.name)))
+        if place.exists():
+            shutil.copymode(place, file)
+        os.replace(file, place)
+    if target.kind == "frames":
+        # The rest of an older, longer clip would be played as part of this one.
+        stale = map(target.numbered, itertools.count(len(made)))
+        for old in itertools.takewhile(Path.is_file, stale):
+            old.unlink()

@@ -1,0 +1,303 @@
+"""A clip as a video or an animated picture, written by FFmpeg through PyAV. See `clip`."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import UnsupportedError
+
+if TYPE_CHECKING:
+    from av import VideoFrame
+    from av.filter import Graph
+
+Frame = NDArray[np.uint8]
+
+MOVIES = ("mp4", "webm", "webp", "gif", "apng")
+"""Kinds of target that need PyAV."""
+
+
+def import_av() -> Any:
+    """PyAV.
+
+    Raises:
+        UnsupportedError: It is not installed.
+    """
+    try:
+        import av
+    except ImportError:
+        raise UnsupportedError(
+            "video and animated pictures need PyAV: pip install 'proxyimg-codec[animate]'"
+        ) from None
+    return av
+
+
+def write_errors() -> tuple[type[Exception], ...]:
+    """What raises where a clip cannot be written."""
+    with contextlib.suppress(UnsupportedError):
+        return (OSError, import_av().FFmpegError)
+    return (OSError,)
+
+
+def movie_of(
+    kind: str, file: Path, first: Frame, rate: Fraction, loop: bool, quality: int
+) -> _Movie | _Gif:
+    """The coder of a file that FFmpeg writes.
+
+    Args:
+        kind: One of `MOVIES`.
+        file: What to write; a folder for temporary files besides.
+        first: The first frame; tells size and alpha, and is not written.
+        rate: Frames a second.
+        loop: Repeat for ever.
+        quality: 0 to 100.
+    """
+    alpha = first.shape[2] == 4
+    if kind == "gif":
+        return _Gif(file, first, rate, loop)
+    if kind == "webp":
+        lossless = quality == 100 or _lossless_is_no_larger(first, quality)
+        coding = _webp(loop, quality, lossless)
+    elif kind == "apng":
+        coding = _apng(alpha, loop)
+    else:
+        coding = _mp4(quality) if kind == "mp4" else _webm(alpha, quality)
+    return _Movie(file, coding, first, rate)
+
+
+@dataclass(frozen=True)
+class _Coding:
+    """How FFmpeg is to write a file.
+
+    Attributes:
+        container: Its name for the type of file.
+        codec: Its name for the encoder.
+        pixels: Its name for the layout of pixels.
+        options: Of the encoder.
+        muxing: Of the container.
+        ticks: In a second, if the file counts time by them; else it counts frames.
+    """
+
+    container: str
+    codec: str
+    pixels: str
+    options: dict[str, str] = field(default_factory=dict)
+    muxing: dict[str, str] = field(default_factory=dict)
+    ticks: int | None = None
+
+    @property
+    def is_video(self) -> bool:
+        """Colours are Y'CbCr in the limited range, and sides even."""
+        return self.pixels.startswith("yuv")
+
+
+def _mp4(quality: int) -> _Coding:
+    crf = 12 + (100 - quality) * 39 / 100
+    options = {"preset": "slow", "crf": f"{crf:.2f}"}
+    return _Coding("mp4", "libx264", "yuv420p", options, {"movflags": "+faststart"})
+
+
+def _webm(alpha: bool, quality: int) -> _Coding:
+    crf = 14 + (100 - quality) * 49 // 100
+    options = {"deadline": "good", "cpu-used": "3", "crf": str(crf), "b": "0"}
+    return _Coding("webm", "libvpx-vp9", "yuva420p" if alpha else "yuv420p", options)
+
+
+def _webp(loop: bool, quality: int, lossless: bool) -> _Coding:
+    # With a lossless picture, quality is the effort.
+    options = {"lossless": str(int(lossless)), "quality": str(50 if lossless else quality)}
+    muxing = {"loop": str(int(not loop))}
+    return _Coding("webp", "libwebp_anim", "bgra", options, muxing, 1000)
+
+
+def _apng(alpha: bool, loop: bool) -> _Coding:
+    options = {"pred": "mixed", "compression_level": "4"}
+    return _Coding(
+        "apng", "apng", "rgba" if alpha else "rgb24", options, {"plays": str(int(not loop))}
+    )
+
+
+def _gif(loop: bool) -> _Coding:
+    return _Coding("gif", "gif", "pal8", muxing={"loop": "0" if loop else "-1"}, ticks=100)
+
+
+class _Movie:
+    """A file that FFmpeg writes.
+
+    Video is converted with the matrix of ITU-R BT.709 and says so; its primaries are those of sRGB,
+    and the transfer function is called what it is, that of sRGB (ITU-T H.273, code points 1 and
+    13).
+    """
+
+    def __init__(
+        self, file: Path | io.BytesIO, coding: _Coding, first: Frame, rate: Fraction
+    ) -> None:
+        av = import_av()
+        self._coding = coding
+        self._rate = rate
+        self._count = 0
+        height, width = (n + (n & 1 if coding.is_video else 0) for n in first.shape[:2])
+        self._pad = ((0, height - first.shape[0]), (0, width - first.shape[1]), (0, 0))
+        self._container = av.open(
+            file if isinstance(file, io.BytesIO) else str(file),
+            "w",
+            format=coding.container,
+            options={"fflags": "+bitexact", **coding.muxing},
+        )
+        stream = self._container.add_stream(coding.codec, rate=rate, options=coding.options)
+        stream.width, stream.height, stream.pix_fmt = width, height, coding.pixels
+        context = stream.codec_context
+        context.time_base = Fraction(1, coding.ticks) if coding.ticks else 1 / rate
+        # What the encoders write depends on the number of threads.
+        context.thread_count = 1
+        context.flags |= av.codec.context.Flags.bitexact
+        if coding.is_video:
+            context.color_primaries, context.color_trc = 1, 13
+            context.colorspace, context.color_range = 1, 1
+        self._stream = stream
+        self._input = (width, height, _layout(first))
+
+    @cached_property
+    def _converter(self) -> Graph:
+        """From the pixels of frames to those of the encoder."""
+        steps = [("format", f"pix_fmts={self._coding.pixels}")]
+        if self._coding.is_video:
+            flags = "bicubic+accurate_rnd+full_chroma_int+full_chroma_inp"
+            steps.insert(0, ("scale", f"flags={flags}:out_color_matrix=bt709:out_range=tv"))
+        return _graph(steps, [self._input])
+
+    def add(self, frame: Frame) -> None:
+        """Takes the next frame."""
+        if self._coding.is_video:
+            frame = np.pad(frame, self._pad, mode="edge")
+        self._converter.push(_video_frame(frame, self._count))
+        self.encode(next(_pulled(self._converter)))
+
+    def encode(self, picture: VideoFrame) -> None:
+        """Takes a frame as the encoder wants it."""
+        ticks = self._coding.ticks
+        picture.pts = round(self._count * ticks / self._rate) if ticks else self._count
+        picture.time_base = self._stream.codec_context.time_base
+        if self._coding.is_video:
+            picture.color_primaries, picture.color_trc = 1, 13
+        self._count += 1
+        self._container.mux(self._stream.encode(picture))
+
+    def finish(self) -> None:
+        """Completes the file."""
+        self._container.mux(self._stream.encode())
+        self._container.close()
+
+    def close(self) -> None:
+        """Lets go of the file."""
+        # After a failure it would complete the file, which may fail again and matters to nobody.
+        with contextlib.suppress(*write_errors()):
+            self._container.close()
+
+
+class _Gif:
+    """A GIF of one palette for all frames, which are therefore seen twice.
+
+    A palette a frame made files 1.3 to 2.3 times as large, and flickered; error diffusion is nearer
+    to the colours than an ordered pattern, and FFmpeg confines it to the box of what moves.
+    """
+
+    def __init__(self, file: Path, first: Frame, rate: Fraction, loop: bool) -> None:
+        self._shape = first.shape
+        self._spool = file.with_suffix(".frames")
+        self._movie = _Movie(file, _gif(loop), first, rate)
+        self._count = 0
+        self._input = (first.shape[1], first.shape[0], _layout(first))
+        self._palette = _graph([("palettegen", "stats_mode=full")], [self._input])
+
+    def add(self, frame: Frame) -> None:
+        """Takes the next frame."""
+        with open(self._spool, "ab") as spool:
+            spool.write(frame.data)
+        self._palette.push(_video_frame(frame, self._count))
+        self._count += 1
+
+    def finish(self) -> None:
+        """Completes the file."""
+        self._palette.push(None)
+        palette = next(_pulled(self._palette))
+        steps = [("paletteuse", "dither=sierra3:diff_mode=rectangle:alpha_threshold=128")]
+        colours = _graph(steps, [self._input, (palette.width, palette.height, palette.format.name)])
+        palette.pts = 0
+        colours.push(palette, 1)
+        colours.push(None, 1)
+        with open(self._spool, "rb") as spool:
+            for k in range(self._count):
+                frame = np.fromfile(spool, np.uint8, math.prod(self._shape))
+                colours.push(_video_frame(frame.reshape(self._shape), k), 0)
+                self._encode(colours)
+        colours.push(None, 0)
+        self._encode(colours)
+        self._spool.unlink()
+        self._movie.finish()
+
+    def _encode(self, colours: Graph) -> None:
+        for picture in _pulled(colours):
+            self._movie.encode(picture)
+
+    def close(self) -> None:
+        """Lets go of the file."""
+        self._movie.close()
+
+
+def _lossless_is_no_larger(first: Frame, quality: int) -> bool:
+    """Whether the first frame, as WebP, is no larger without loss: true of flat drawings."""
+    sizes = []
+    for lossless in (True, False):
+        buffer = io.BytesIO()
+        movie = _Movie(buffer, _webp(True, quality, lossless), first, Fraction(1))
+        movie.add(first)
+        movie.finish()
+        sizes.append(len(buffer.getvalue()))
+    return sizes[0] <= sizes[1]
+
+
+def _layout(frame: Frame) -> str:
+    return "rgba" if frame.shape[2] == 4 else "rgb24"
+
+
+def _video_frame(frame: Frame, number: int) -> VideoFrame:
+    """FFmpeg's view of a frame [H, W, 3 or 4]."""
+    picture: VideoFrame = import_av().VideoFrame.from_ndarray(frame, _layout(frame))
+    picture.pts = number
+    return picture
+
+
+def _graph(steps: list[tuple[str, str]], inputs: list[tuple[int, int, str]]) -> Graph:
+    """A chain of FFmpeg's filters; the first has inputs of these widths, heights and layouts."""
+    av = import_av()
+    chain: Graph = av.filter.Graph()
+    chain.threads = 1
+    nodes = [chain.add(*step) for step in steps] + [chain.add("buffersink")]
+    for k, (width, height, layout) in enumerate(inputs):
+        form = av.VideoFormat(layout)
+        source = chain.add_buffer(
+            width=width, height=height, format=form, name=f"in{k}", time_base=Fraction(1)
+        )
+        source.link_to(nodes[0], 0, k)
+    chain.link_nodes(*nodes)
+    chain.configure(auto_buffer=False)
+    return chain
+
+
+def _pulled(chain: Graph) -> Iterator[VideoFrame]:
+    """What the chain has ready."""
+    av = import_av()
+    with contextlib.suppress(av.BlockingIOError, av.EOFError):
+        while True:
+            yield chain.vpull()
