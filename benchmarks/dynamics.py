@@ -85,6 +85,8 @@ def measure(bodies: list[Body], motion: Motion, steps: int) -> str:
     """Runs the steps of a motion; a line of what came of it."""
     system = System(bodies, motion, CANVAS, measured=True)
     still = system.w == 0
+    for *_, led in system.curves:
+        still[led] = False
     first, excess, top = system.energy(), -np.inf, 0.0
     pins, area, least, mean = 0.0, 0.0, np.inf, 0.0
     for _ in range(steps):

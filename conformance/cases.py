@@ -20,7 +20,7 @@ class Render:
     """One picture that a decoder must be able to make of a case's input.
 
     Attributes:
-        args: Arguments of `Image.render` that ask for it.
+        args: Arguments of `Image.render` that ask for it, with ``time`` for `t`.
         flags: Command-line flags that do.
         expected: PNG file of the pixels.
         peak: Largest error of a sample that is allowed, in 8-bit levels.
@@ -92,6 +92,8 @@ def flags(args: Mapping[str, Any]) -> tuple[str, ...]:
     for key in ("width", "height"):
         if key in args:
             out += [f"--{key}", str(args[key])]
+    if "time" in args:
+        out += ["--time", str(args["time"])]
     for name in args.get("layers", []):
         out += ["--layer", name]
     if not args.get("background", True):

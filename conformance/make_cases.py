@@ -26,8 +26,10 @@ from proxyimg_codec.pictures import encode_png
 from . import (
     bent,
     invalid,
+    invalid_motion,
     invalid_posed,
     invalid_pyramids,
+    moving,
     nodes,
     posed,
     pyramid_views,
@@ -41,9 +43,11 @@ from .cases import EXIT_CODES, FOLDER
 
 VALID = {
     **valid.CASES, **views.CASES, **bent.CASES, **posed.CASES, **nodes.CASES, **pyramids.CASES,
-    **pyramid_views.CASES,
+    **pyramid_views.CASES, **moving.CASES,
 }  # fmt: skip
-INVALID = {**invalid.CASES, **invalid_posed.CASES, **invalid_pyramids.CASES}
+INVALID = {
+    **invalid.CASES, **invalid_posed.CASES, **invalid_pyramids.CASES, **invalid_motion.CASES,
+}  # fmt: skip
 
 PEAK, RMS = 0.05, 0.01
 """Errors in 8-bit levels that are allowed: ten times what float32 sums in another order cost."""
@@ -129,7 +133,9 @@ def _write(folder: Path) -> None:
         if "error" in description:
             _check_refusal(name, data, description["exit_code"])
         for render in description.get("renders", []):
-            pixels = from_bytes(data).render(**render["args"], dtype=np.uint16, engine="numpy")
+            args = dict(render["args"])
+            at = args.pop("time", None)
+            pixels = from_bytes(data).render(t=at, **args, dtype=np.uint16, engine="numpy")
             (target / render["expected"]).write_bytes(encode_png(pixels))
 
 

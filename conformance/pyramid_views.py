@@ -135,7 +135,7 @@ def _pyramid_cuts_several(n: Numbers) -> Image:
 _PIECES = [{"layers": [name]} for name in ("back", "disc", "bar")]
 
 
-def _pieces(n: Numbers, poses: dict[str, Pose], copied: str = "") -> Image:
+def pieces(n: Numbers, poses: dict[str, Pose], copied: str = "") -> Image:
     """A bar over a disc over a back layer, cut by each other, posed; then a copy of one."""
     size = 40, 30
     source = coded(n, size, levels=3)
@@ -159,23 +159,21 @@ def _pieces(n: Numbers, poses: dict[str, Pose], copied: str = "") -> Image:
 @_case("A layer is moved away between two others: what is mixed with it does not show",
        "pyramid: cuts", "pyramid: moved", renders=[WHOLE, CLOSE, *_PIECES])  # fmt: skip
 def _pyramid_cuts_moved(n: Numbers) -> Image:
-    return _pieces(n, {"disc": Pose(shift=(-4 * 1024, 2 * 1024 + 300))})
+    return pieces(n, {"disc": Pose(shift=(-4 * 1024, 2 * 1024 + 300))})
 
 
 @_case("Two layers are moved together: what they are mixed with of each other shows",
        "pyramid: cuts", "pyramid: moved", renders=[WHOLE, CLOSE, *_PIECES])  # fmt: skip
 def _pyramid_cuts_together(n: Numbers) -> Image:
     pose = Pose(matrix=(1 << 24, 1 << 21, 0, 1 << 24), shift=(1024, -3 * 1024))
-    return _pieces(n, {"disc": pose, "bar": pose})
+    return pieces(n, {"disc": pose, "bar": pose})
 
 
 @_case("A layer that shines through, and a copy of it elsewhere", "pyramid: cuts",
        "pyramid: moved", "texture: shared",
        renders=[WHOLE, *_PIECES, {"layers": ["copy"]}])  # fmt: skip
 def _pyramid_cuts_opacity(n: Numbers) -> Image:
-    return _pieces(
-        n, {"disc": Pose(opacity=40000), "copy": Pose(shift=(3 * 1024, 0))}, copied="bar"
-    )
+    return pieces(n, {"disc": Pose(opacity=40000), "copy": Pose(shift=(3 * 1024, 0))}, copied="bar")
 
 
 @_case("A hidden layer that is drawn alone, and a copy of it in its place", "pyramid: cuts",
@@ -183,14 +181,14 @@ def _pyramid_cuts_opacity(n: Numbers) -> Image:
        renders=[WHOLE, *_PIECES, {"layers": ["copy"]}])  # fmt: skip
 def _pyramid_cuts_hidden(n: Numbers) -> Image:
     colour = (4096, 0, 0, -300, 0, 3000, 0, 200, 0, 0, 4096, 0)
-    return _pieces(n, {"disc": Pose(hidden=True), "copy": Pose(colour=colour)}, copied="disc")
+    return pieces(n, {"disc": Pose(hidden=True), "copy": Pose(colour=colour)}, copied="disc")
 
 
 @_case("A bent layer", "pyramid: cuts", "pyramid: moved", "pose: displacements",
        renders=[WHOLE, *_PIECES])  # fmt: skip
 def _pyramid_cuts_bent(n: Numbers) -> Image:
     mesh = grid_mesh((9, 6), 5, 4)
-    made = _pieces(n, {"bar": Pose(nodes=bend(n, mesh))})
+    made = pieces(n, {"bar": Pose(nodes=bend(n, mesh))})
     layers = list(made.layers)
     layers[2] = replace(layers[2], mesh=mesh)
     return replace(made, layers=Layers(layers))

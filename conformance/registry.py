@@ -24,7 +24,7 @@ class Valid:
         title: One sentence.
         tests: What it is there for.
         build: Makes the picture, or its file where the package would not write it so.
-        renders: Arguments of each render.
+        renders: Arguments of each render, as in `cases.Render`.
     """
 
     title: str

@@ -27,6 +27,7 @@ from proxyimg_codec.geometry import coverage, deltas
 from proxyimg_codec.render import compose, view
 from proxyimg_codec.texture import diffusion, implicit, network
 
+from .wrong_motion import FAULTS as FAULTS_OF_MOTION
 from .wrong_poses import FAULTS as FAULTS_OF_POSES
 from .wrong_poses import Anything, Patch
 from .wrong_pyramids import FAULTS as FAULTS_OF_PYRAMIDS
@@ -179,6 +180,7 @@ FAULTS: dict[str, list[Patch]] = {
     "refuses-maps": [(file, "unpack", _refusing_maps)],
     **FAULTS_OF_POSES,
     **FAULTS_OF_PYRAMIDS,
+    **FAULTS_OF_MOTION,
     "exit-code-1": [(decode, "main", _crashing)],
     "exit-code-0": [(decode, "main", _obliging)],
     "hangs": [(decode, "main", _hanging)],

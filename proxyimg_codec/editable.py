@@ -87,6 +87,10 @@ class Editable:
         """Drawn again."""
         return self._edited("show")
 
+    def stilled(self) -> Image:
+        """Without its motion."""
+        return self._edited("still")
+
     def with_opacity(self, value: float) -> Image:
         """With opacity `value` in 0..1."""
         return self._edited("opacity", value=value)

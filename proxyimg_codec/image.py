@@ -235,21 +235,25 @@ class Image:
         return replace(self, history=())
 
     def at(self, t: float) -> Image:
-        """The still that the picture is at a time in seconds; without a timeline, itself.
+        """The still that a picture that moves is at a time in seconds.
 
         Before and after its timeline a picture stays as it is at its ends, unless it loops.
 
         Raises:
-            UsageError: The time is not a number.
+            UsageError: The picture has no timeline, or the time is not a number.
         """
         if self.timeline is None:
-            return self
+            raise UsageError("the picture does not move; give it a motion first (pxi-animate)")
         moved = [
             layer
             if layer.track is None
             else replace(
                 layer,
-                pose=replace(layer.pose, sway=layer.track.at(self.timeline, t)),
+                pose=replace(
+                    layer.pose,
+                    sway=layer.track.at(self.timeline, t),
+                    body=layer.track.body,
+                ),
                 track=None,
             )
             for layer in self.layers
@@ -290,7 +294,7 @@ class Image:
         """Renders the picture, or part of it, at any size.
 
         Args:
-            t: Time in seconds, of a picture that moves; by default the still is drawn.
+            t: Time in seconds, of a picture with a timeline; by default the still is drawn.
             width: Output columns; with `height` left out, the aspect is kept.
             height: Output rows.
             scale: Output pixels a canvas pixel, instead of width and height.
@@ -307,7 +311,8 @@ class Image:
             [height, width, 4] with straight alpha.
 
         Raises:
-            UsageError: A request that makes no sense, or an unknown layer.
+            UsageError: A request that makes no sense, an unknown layer, or a time of a picture
+                that does not move.
             UnsupportedError: The engine is not installed.
             LimitError: The output is too large.
         """

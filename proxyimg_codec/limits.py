@@ -29,8 +29,9 @@ class Limits:
             filled.
         covered: Raster samples of all parts that boundaries cut, once for each of these, and for
             each layer behind one that cuts itself.
-        wavefronts: Columns plus twice the rows of a plane of codes or a mask, or plus thrice the
-            rows of a raster: steps of its decoding.
+        wavefronts: Columns plus twice the rows of a plane of codes, a mask, or the curves or shapes
+            of a motion, or plus thrice the rows of a raster: steps of its decoding.
+        motion: Coefficients of all curves, and coordinates of all shapes, together.
         parameters: Parameters of all networks together.
         metadata_bytes: One metadata block after decompression.
         output_pixels: Pixels of one rendered picture.
@@ -51,6 +52,7 @@ class Limits:
     filled: int = 1 << 27
     covered: int = 1 << 31
     wavefronts: int = 1 << 16
+    motion: int = 1 << 22
     parameters: int = 1 << 22
     metadata_bytes: int = 1 << 26
     output_pixels: int = 1 << 28

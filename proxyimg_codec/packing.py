@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from .container import meta, texr
@@ -114,6 +115,7 @@ def _motion(image: Image) -> dict[str, Any] | None:
         "intervals": line.intervals,
         "unit": line.unit,
         "layers": [i for i, _, _ in moving],
+        "bodies": [track.body for _, track, _ in moving],
         "modes": len(moving[0][1].curves),
         "curve_classes": curves[0],
         "curve_deltas": curves[1],
@@ -204,5 +206,6 @@ def _moving(
         (fields[f"{name}_classes"], fields[f"{name}_deltas"]) for name in ("curve", "shape")
     )
     refined = [meshes[n].refined for n in numbers]
-    found = tracks.decode(curves, shapes, fields["modes"], timeline, refined, where)
-    return timeline, dict(zip(numbers, found, strict=True))
+    found = tracks.decode(curves, shapes, fields["modes"], timeline, refined, where, limits)
+    bodies = zip(found, fields["bodies"], strict=True)
+    return timeline, dict(zip(numbers, (replace(t, body=b) for t, b in bodies), strict=True))

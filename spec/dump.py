@@ -20,6 +20,7 @@ from proxyimg_codec.geometry import coverage as cover
 from proxyimg_codec.geometry.boundary import Boundary
 from proxyimg_codec.geometry.mesh import Refined
 from proxyimg_codec.geometry.pose import Pose
+from proxyimg_codec.geometry.track import Track
 from proxyimg_codec.image import Image, from_bytes
 from proxyimg_codec.texture.diffusion import fill
 from proxyimg_codec.texture.planes import Planes
@@ -89,6 +90,11 @@ BINARY: dict[str, Callable[[bytes], Iterator[Piece]]] = {
     "escapes": blob("7 bits a byte, low first"),
     "data": coded_array,
     "mask": coded_array,
+    "curve_classes": coded_array,
+    "curve_deltas": blob("raw bits"),
+    "shape_classes": coded_array,
+    "shape_deltas": blob("raw bits"),
+    "script": blob("Zstandard frame"),
     "state": blob("SHA-256"),
     "zstd": blob("Zstandard frame"),
 }
@@ -205,6 +211,15 @@ def pose_values(name: str, pose: Pose) -> Iterator[str]:
             yield from points(moved)
 
 
+def track_values(name: str, track: Track) -> Iterator[str]:
+    """Lines of the curves and shapes of a layer that moves."""
+    yield f"layer {name!r}, body {track.body}, coefficients of curves in 1/256"
+    yield from grid(track.curves)
+    for k, shape in enumerate(track.shapes):
+        yield f"layer {name!r}, shape {k}"
+        yield from points(shape)
+
+
 def shape_values(name: str, outline: Boundary, width: int, height: int) -> Iterator[str]:
     """Lines of the outline of a layer and its coverage of the canvas."""
     for k, path in enumerate(outline.paths):
@@ -262,6 +277,8 @@ def values(image: Image) -> Iterator[str]:
             yield from mesh_values(layer.name, layer.mesh.refined)
         if not layer.pose.at_rest:
             yield from pose_values(layer.name, layer.pose)
+        if layer.track is not None:
+            yield from track_values(layer.name, layer.track)
         if layer.outline is not None:
             yield from shape_values(layer.name, layer.outline, image.width, image.height)
         if layer.texture in shown:

@@ -73,6 +73,16 @@ def small_pxi(tmp_path_factory, small_masks) -> Path:
     return path
 
 
+@pytest.fixture(scope="session")
+def moving_pxi(tmp_path_factory) -> Path:
+    """A file of 64x48 pixels with the layers back, bar and disc, of which the last two move."""
+    from tests import moving
+
+    path = tmp_path_factory.mktemp("moving") / "moving.pxi"
+    moving.picture().save(path)
+    return path
+
+
 @pytest.fixture
 def made_up_planes(monkeypatch) -> None:
     """Planes of files have the samples that `tests.pyramids` makes up, whatever they hold."""

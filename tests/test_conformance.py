@@ -84,7 +84,7 @@ def test_the_suite_is_sound():
         }
         # RMS can never exceed peak: a larger limit would test nothing.
         assert all(0 < r.rms < r.peak < 0.5 for r in case.renders)
-    assert sum(f.stat().st_size for f in FOLDER.rglob("*.*")) < 1_200_000
+    assert sum(f.stat().st_size for f in FOLDER.rglob("*.*")) < 1_300_000
 
 
 def test_bases_of_refused_files_are_good():
@@ -241,6 +241,38 @@ CAUGHT = {
     "loses-rims-of-what-moves-together": ("pyramid-cuts-together", "pixels", "pyramid-cuts-moved"),
     "trusts-mixed-samples": ("pyramid-cuts", "pixels", "pyramid-moved"),
     "trusts-samples-near": ("pyramid-cuts", "pixels", "pyramid-moved"),
+    "ignores-motion": ("moves-loop", "pixels", "moved"),
+    "moves-without-a-time": ("moves-loop", "pixels", "moved"),
+    "linear-curves": ("moves-loop", "pixels", "moves-loop-1"),
+    "curves-through-coefficients": ("moves-loop", "pixels", "moves-loop-1"),
+    "stops-at-the-end": ("moves-loop", "pixels", "moves-once"),
+    "always-loops": ("moves-once", "pixels", "moves-loop"),
+    "end-is-the-beginning": ("moves-once", "pixels", "moves-loop"),
+    "mirrors-negative-times": ("moves-loop", "pixels", "moves-unit-0"),
+    "whole-frames": ("moves-loop", "pixels", "moves-loop-1"),
+    "loops-do-not-wrap": ("moves-loop", "pixels", "moves-once"),
+    "interval-late": ("moves-loop", "pixels", "moves-loop-1"),
+    "interval-early": ("moves-loop", "pixels", "moves-loop-1"),
+    "curves-not-summed": ("moves-loop", "pixels", "moves-loop-1"),
+    "curves-summed-over-layers": ("moves-layers", "pixels", "moves-loop"),
+    "one-curve-for-all": ("moves-loop", "pixels", "moves-unit-0"),
+    "first-shape-only": ("moves-loop", "pixels", "moves-unit-0"),
+    "shapes-in-one-row": ("moves-loop", "exit", "moves-unit-0"),
+    "shapes-without-midpoints": ("moves-layers", "pixels", "moves-loop"),
+    "moves-the-first-meshes": ("moves-layers", "exit", "moves-loop"),
+    "ignores-unit": ("moves-unit-6", "pixels", "moves-loop"),
+    "x-for-y": ("moves-loop", "pixels", "moves-nowhere"),
+    "motion-floored": ("moves-loop", "pixels", "moves-nowhere"),
+    "motion-unclamped": ("moves-far", "pixels", "moves-loop"),
+    "forgets-bends": ("moves-posed", "pixels", "moves-loop"),
+    "moves-after-mapping": ("moves-posed", "pixels", "moves-loop"),
+    "still-where-nothing-moves": ("moves-nowhere", "pixels", "moves-loop"),
+    "bodies-apart": ("moves-together", "pixels", "moves-apart"),
+    "one-body": ("moves-apart", "pixels", "moves-together"),
+    "bodies-rest-on-all": ("moves-nowhere", "pixels", "moves-loop"),
+    "accepts-large-curves": ("invalid-motion-curve-high", "exit", "invalid-motion-shape-high"),
+    "accepts-large-shapes": ("invalid-motion-shape-low", "exit", "invalid-motion-curve-low"),
+    "accepts-any-motion": ("invalid-motion-back", "exit", "moves-loop"),
     "exit-code-1": ("invalid-empty", "exit", "layers"),
     "exit-code-0": ("invalid-empty", "exit", "layers"),
 }
@@ -363,9 +395,24 @@ def test_the_runner_refuses_senseless_options(options, capsys):
 
 def test_flags_follow_from_arguments():
     args = {"region": [1, 2, 3, 4], "height": 9, "layers": ["a b", "c"], "background": False}
-    assert " ".join(flags(args)) == (
-        "--bit-depth 16 --region 1,2,3,4 --height 9 --layer a b --layer c --no-background"
+    assert " ".join(flags({**args, "time": -0.25})) == (
+        "--bit-depth 16 --region 1,2,3,4 --height 9 --time -0.25 --layer a b --layer c "
+        "--no-background"
     )
+
+
+def test_cases_cite_what_chapter_12_demands():
+    cited = {word for case in CASES for test in case.tests for word in test.split()}
+    text = (FOLDER.parents[1] / "spec" / "12-motion.md").read_text("utf-8")
+    assert {f"MOT-{n}" for n in range(1, text.count("**[MOT-") + 1)} <= cited
+
+
+def test_what_moves_shows_its_still_first():
+    moving = [case for case in CASES if case.name.startswith("moves-")]
+    assert len(moving) > 10
+    for case in moving:
+        assert "time" not in case.renders[0].args
+        assert all("time" in render.args for render in case.renders[1:])
 
 
 def picture(*pixel, dtype=np.uint16, shape=(3, 5)):

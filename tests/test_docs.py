@@ -44,6 +44,12 @@ def folder(tmp_path_factory):
         )
     labels = np.where(mask, 2, low.astype(int)).astype(np.uint8)
     pictures.write(path / "labels.png", np.repeat(labels[..., None], 3, 2))
+    clear = np.dstack([smooth(96, 64), disc(96, 64) * np.uint8(255)])
+    pictures.write(path / "character.png", np.ascontiguousarray(clear.transpose(1, 0, 2)))
+    pictures.write(path / "bear.png", clear)
+    pictures.write(path / "parrots.png", smooth(96, 64))
+    pictures.write(path / "parrots-labels.png", np.repeat(labels[..., None], 3, 2))
+    (path / "breathe.json").write_text(blocks("docs/guide.md", "json")[0])
     edits = [{"op": "move", "layer": "cat", "by": [3, 4]}]
     (path / "edits.json").write_text(json.dumps({"version": 1, "edits": edits}))
     return path
@@ -55,7 +61,7 @@ def test_commands_run(page, folder):
     if not (folder / "photo.pxi").exists():
         run([*tool("pxi-encode"), "photo.png", "--preset", "fast"], folder)
     for words in commands(page):
-        force = words[0] in ("pxi-encode", "pxi-edit") and "--force" not in words
+        force = words[0] in ("pxi-encode", "pxi-edit", "pxi-animate") and "--force" not in words
         run([*tool(words[0]), *words[1:], *(["--force"] if force else [])], folder)
 
 

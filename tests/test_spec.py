@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from conformance import pixels
 from conformance.cases import load
-from proxyimg_codec.container import chunks
+from proxyimg_codec.container import chunks, file
 from proxyimg_codec.entropy import arrays, laplace, rans
 from proxyimg_codec.errors import FormatError
 from proxyimg_codec.geometry import boundary, coverage, deltas, mesh, pose, warp
@@ -481,6 +481,87 @@ def test_sums_of_the_context_are_exact_in_single_precision():
 CASES = [c for c in load() if not c.error]
 
 
+def displacements_by_the_letter(fields, shapes, curves, t):
+    """MOT-6 and MOT-7 in whole numbers: t in microseconds, in 1/1024 pixel for each node."""
+    duration, loop, intervals = (fields[k] for k in ("duration", "loop", "intervals"))
+    end, count = 1000 * duration, intervals if loop else intervals + 3
+    t = t % end if loop else min(max(t, 0), end)
+    i, f = divmod(1024 * t * intervals // end, 1024)
+    if t == end:
+        i, f = intervals - 1, 1024
+    g = 1024 - f
+    weights = (
+        g**3, 3 * f**3 - 6 * 1024 * f**2 + 4 * 1024**3,
+        3 * g**3 - 6 * 1024 * g**2 + 4 * 1024**3, f**3,
+    )  # fmt: skip
+    values = []
+    for c in curves:
+        taps = [c[(i + k) % count if loop else i + k] for k in range(4)]
+        total = 256 * sum(w * tap for w, tap in zip(weights, taps, strict=True))
+        values.append((total + 3 * 1024**3) // (6 * 1024**3))
+    out = []
+    for node in range(len(shapes[0])):
+        point = []
+        for axis in (0, 1):
+            total = sum(v * s[node][axis] for v, s in zip(values, shapes, strict=True))
+            moved = (2 ** (10 - fields["unit"]) * total + 2**15) >> 16
+            point.append(min(max(moved, -(1 << 30)), 1 << 30))
+        out.append(point)
+    return out
+
+
+def tracks_by_the_letter(program, fields, meshes):
+    """MOT-3 and MOT-4 with the program of the chapters: shapes and curves of each layer."""
+    modes, count = fields["modes"], fields["intervals"] + 3 * (not fields["loop"])
+    steps = program["decode_signed"](
+        fields["curve_classes"], fields["curve_deltas"], modes, len(meshes) * count
+    )
+    nodes = sum(len(m[0]) for m in meshes)
+    everywhere = program["everywhere"](modes, nodes)
+    classes = program["decode_array"](fields["shape_classes"], 2, modes, nodes, 4, everywhere)
+    raw = program["Bits"](fields["shape_deltas"])
+    residuals = {}
+    for place in sorted(classes):  # axis, shape, node
+        size = classes[place]
+        sign = -1 if size and raw.take(1) else 1
+        low = raw.take(31 if size == 15 else max(size - 1, 0))
+        residuals[place] = sign * (low if size in (0, 15) else low + (1 << (size - 1)))
+    out, first = [], 0
+    for number, (rest, ends, _) in enumerate(meshes):
+        curves = []
+        for m in range(modes):
+            row = steps[m][number * count : (number + 1) * count]
+            curves.append([sum(row[: k + 1]) for k in range(count)])
+        shapes = [[[0, 0] for _ in rest] for _ in range(modes)]
+        for (axis, m, node), residual in residuals.items():
+            node -= first
+            if 0 <= node < len(rest):
+                a, b = ends[node]
+                known = shapes[m]
+                before = known[node - 1][axis] if node else 0
+                expected = before if a == b else (known[a][axis] + known[b][axis]) >> 1
+                known[node][axis] = expected + residual
+        out.append((shapes, curves))
+        first += len(rest)
+    return out
+
+
+@pytest.mark.parametrize("case", [c for c in CASES if c.name.startswith("moves-")],
+                         ids=lambda c: c.name)  # fmt: skip
+def test_motion_is_what_chapter_12_says(program, case):
+    data = case.input.read_bytes()
+    fields = file.parse(data).motion
+    image = from_bytes(data)
+    moving = [image.layers[k] for k in fields["layers"]]
+    found = tracks_by_the_letter(program, fields, [decoded(program, v.mesh) for v in moving])
+    for layer, (shapes, curves) in zip(moving, found, strict=True):
+        assert shapes == layer.track.shapes.tolist()
+        assert curves == layer.track.curves.tolist()
+        for t in (0, 1, 123456, 7_000_003, 10**9 + 1, -1, -777_777, 1000 * fields["duration"]):
+            want = displacements_by_the_letter(fields, shapes, curves, t)
+            assert layer.track.at(image.timeline, t / 1e6).tolist() == want
+
+
 @pytest.mark.parametrize("case", CASES, ids=lambda c: c.name)
 def test_program_passes_the_conformance_suite(program, case):
     want = pixels.read(case.renders[0].expected.read_bytes()) / 257
@@ -508,6 +589,7 @@ def test_dump_covers_every_byte(small_pxi, example, capsys):
         c.input.read_bytes()
         for c in CASES
         if c.name in ("closing-deep", "shared", "undo", "pyramid-cells", "pyramid-escapes", "maps")
+        or c.name in ("moves-layers", "moves-once")
     ]
     for data in (small_pxi.read_bytes(), example, *posed):
         assert sum(size for size, _ in dump.pieces(data)) == len(data)
@@ -558,5 +640,11 @@ def test_dump_prints_meshes_and_poses():
     assert (
         lines[at + 6].split() == image.layers[1].texture.shown[5].astype(int).astype(str).tolist()
     )
+    lines = list(dump.values(from_bytes(data["moves-loop"])))
+    track = from_bytes(data["moves-loop"]).layers["disc"].track
+    at = lines.index("layer 'disc', body 0, coefficients of curves in 1/256")
+    assert [int(v) for v in lines[at + 2].split()] == track.curves[1].tolist()
+    at = lines.index("layer 'disc', shape 1")
+    assert lines[at + 1] == "  " + " ".join(str(tuple(v)) for v in track.shapes[1, :8].tolist())
     lines = list(dump.values(from_bytes(data["shared"])))
     assert "layer 'copy' shows the texture of 'disc'" in lines

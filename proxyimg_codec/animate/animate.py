@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -11,11 +12,13 @@ from ..edit.geometry import meshed
 from ..errors import UsageError
 from ..geometry.mesh import FRACTION_BITS
 from ..image import Image, Layer, Layers
+from . import motion as motions
 from .bake import bake
 from .body import Body
-from .motion import Motion
+from .motion import LayerMotion, Motion
 from .presets import Box
 from .simulate import simulate
+from .together import ridden, touching, united
 
 EDGE = 0.035
 """Edges of meshes that are made for motion, relative to the diagonal of a layer."""
@@ -36,6 +39,10 @@ def boxes(image: Image, names: Sequence[str | int] | None = None) -> dict[str, B
     Raises:
         UsageError: There is no such layer, it cannot move, or no layer can.
     """
+    return {v.name: _box(v, image) for v in _chosen(image, names)}
+
+
+def _chosen(image: Image, names: Sequence[str | int] | None) -> list[Layer]:
     able = movable(image)
     chosen = able if names is None else [image.layers[k] for k in names]
     for layer in chosen:
@@ -46,7 +53,7 @@ def boxes(image: Image, names: Sequence[str | int] | None = None) -> dict[str, B
         raise UsageError(
             "the picture has no layer that can move; encode it with masks or more layers"
         )
-    return {v.name: _box(v, image) for v in chosen}
+    return chosen
 
 
 def _box(layer: Layer, image: Image) -> Box:
@@ -54,6 +61,39 @@ def _box(layer: Layer, image: Image) -> Box:
         return (0.0, 0.0, float(image.width), float(image.height))
     left, top, right, bottom = layer.boundary.bounds()
     return (float(left), float(top), float(right), float(bottom))
+
+
+def preset(
+    image: Image,
+    name: str,
+    names: Sequence[str | int] | None = None,
+    *,
+    together: bool = True,
+    **options: Any,
+) -> Motion:
+    """A motion that suits a picture.
+
+    Args:
+        image: The picture.
+        name: One of `motion.PRESETS`.
+        names: Names or positions of the layers that move; None for all that can.
+        together: Whether layers that touch move as one body.
+        options: As of `motion.preset`: duration, fps, loop, seed, pins.
+
+    Raises:
+        UsageError: There is no such preset or layer, or an option makes no sense.
+    """
+    chosen = _chosen(image, names)
+    groups = [[i] for i in range(len(chosen))]
+    if together:
+        groups = touching(chosen, (image.width, image.height))
+    wholes = {}
+    for group in groups:
+        x0, y0, x1, y1 = zip(*(_box(chosen[i], image) for i in group), strict=True)
+        wholes[chosen[group[0]].name] = (min(x0), min(y0), max(x1), max(y1))
+    made = motions.preset(name, wholes, **options)
+    layers = {chosen[i].name: made.layers[chosen[g[0]].name] for g in groups for i in g}
+    return replace(made, layers=layers, together=together)
 
 
 def animate(
@@ -70,29 +110,71 @@ def animate(
         UsageError: The motion does not fit the picture.
         LimitError: Nodes are flung out of reach.
     """
-    still = [v.name for v in image.layers if v not in movable(image)]
+    able = _chosen(image, None)
     for name in motion.layers:
-        if name in still:
-            boxes(image, [name])
-    layers = [v if v.name in still else meshed(v, EDGE) for v in image.layers]
-    bodies = [
-        Body(v.name, v.mesh.refined.nodes / (1 << FRACTION_BITS), v.mesh.refined.faces)
-        for v in layers
-        if v.name not in still and v.mesh is not None
-    ]
-    if not bodies:
-        boxes(image)
-    found = simulate(bodies, motion, canvas=(image.width, image.height), progress=progress)
-    names = list(found.displacements)
+        if name != "*" and name in (v.name for v in image.layers):
+            _chosen(image, [name])
+    size = (image.width, image.height)
+    meshed_layers = {v.name: meshed(v, EDGE) for v in able}
+    bodies = [_body(v) for v in meshed_layers.values()]
+    riders: dict[str, list[str]] = {}
+    acting = motion
+    if motion.together:
+        riders = _riders(able, motion, size)
+        alone = [b for b in bodies if not any(b.name in group for group in riders.values())]
+        bodies = alone + [
+            united(first, [v for v in able if v.name in group], size, EDGE)
+            for first, group in riders.items()
+        ]
+        followers = {name for first, group in riders.items() for name in group if name != first}
+        kept = {k: v for k, v in motion.layers.items() if k not in followers}
+        acting = replace(motion, layers=kept)
+    found = simulate(bodies, acting, canvas=size, progress=progress)
+    moved = dict(found.displacements)
+    of_name = {b.name: b for b in bodies}
+    for first, group in riders.items():
+        if first not in moved:
+            continue
+        whole = moved[first]
+        for name in group:
+            moved[name] = ridden(of_name[first], whole, _body(meshed_layers[name]).nodes)
+    names = [v.name for v in able if v.name in moved]
     timeline, tracks = bake(
-        list(found.displacements.values()), fps=found.fps, loop=found.loop, script=motion.to_json()
+        [moved[n] for n in names], fps=found.fps, loop=found.loop, script=motion.to_json()
     )
-    track = dict(zip(names, tracks, strict=True))
-    moved = [
-        replace(v, track=track[v.name]) if v.name in track else replace(old, track=None)
-        for v, old in zip(layers, image.layers, strict=True)
+    first_of = {name: first for first, group in riders.items() for name in group}
+    body = {name: names.index(first_of.get(name, name)) for name in names}
+    track = {n: replace(t, body=body[n]) for n, t in zip(names, tracks, strict=True)}
+    layers = [
+        replace(meshed_layers[v.name], track=track[v.name])
+        if v.name in track
+        else replace(v, track=None)
+        for v in image.layers
     ]
-    return replace(image, layers=Layers(moved), timeline=timeline)
+    return replace(image, layers=Layers(layers), timeline=timeline)
+
+
+def _body(layer: Layer) -> Body:
+    assert layer.mesh is not None, "what moves has a mesh"
+    refined = layer.mesh.refined
+    return Body(layer.name, refined.nodes / (1 << FRACTION_BITS), refined.faces)
+
+
+def _riders(layers: Sequence[Layer], motion: Motion, size: tuple[int, int]) -> dict[str, list[str]]:
+    """Layers that move as one, at least two, by the name of their first."""
+    rest = motion.layers.get("*")
+    found: dict[str, list[str]] = {}
+    kinds: list[LayerMotion] = []
+    for layer in layers:
+        own = motion.layers.get(layer.name, rest)
+        if own is not None and own not in kinds:
+            kinds.append(own)
+    for kind in kinds:
+        alike = [v for v in layers if motion.layers.get(v.name, rest) == kind]
+        for group in touching(alike, size):
+            if len(group) > 1:
+                found[alike[group[0]].name] = [alike[i].name for i in group]
+    return found
 
 
 def amplitude(image: Image, frames: int = 24) -> float:

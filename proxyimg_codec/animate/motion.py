@@ -60,6 +60,7 @@ class Motion:
         wind: Or None.
         collide: What collides.
         attachments: What holds layers together.
+        together: Whether layers that touch, and are moved alike, move as one body.
 
     Raises:
         UsageError: Something is out of range or makes no sense; the error names the place.
@@ -76,6 +77,7 @@ class Motion:
     wind: Wind | None = None
     collide: Collide = _FREE
     attachments: tuple[Attachment, ...] = ()
+    together: bool = False
 
     def __post_init__(self) -> None:
         check(self.to_dict())

@@ -19,6 +19,12 @@ Values = dict[str, Any]
 HOP_HEIGHT, HOP_TIME, HOP_EVERY = 0.1, 0.65, 1.3
 """Height of a hop relative to the diagonal, its seconds in the air, and from one to the next."""
 
+BREATH_EVERY, BREATH = 2.0, 1.12
+"""Seconds from one breath to the next, and how much wider a breath makes a chest."""
+
+CHEST, CHEST_RADIUS = 0.6, 0.2
+"""Where that is: height in the box from its top, and radius relative to the diagonal."""
+
 NUDGE_EVERY = 2.0
 """Seconds from one nudge of the jelly to the next."""
 
@@ -120,6 +126,27 @@ def _bounce(boxes: Mapping[str, Box], extent: float, duration: float) -> Values:
     return {"gravity": [0, gravity], "drag": 0.1, "layers": layers}
 
 
+def _breathe(boxes: Mapping[str, Box], extent: float, duration: float) -> Values:
+    """Breathing in and out."""
+    layers = _each(boxes, "jelly", "bottom")
+    starts = _times(duration, BREATH_EVERY)
+    breath = duration / len(starts)
+    for name, (x0, y0, x1, y1) in boxes.items():
+        keys = [
+            {"time": start + late * breath, "scale": scale}
+            for start in starts
+            for late, scale in ((0.0, 1.0), (0.4, BREATH))
+        ]
+        layers[name]["handles"] = [
+            {
+                "at": [(x0 + x1) / 2, y0 + CHEST * (y1 - y0)],
+                "radius": CHEST_RADIUS * math.hypot(x1 - x0, y1 - y0),
+                "keys": [*keys, {"time": duration, "scale": 1.0}],
+            }
+        ]
+    return {"layers": layers}
+
+
 PRESETS: dict[str, Callable[[Mapping[str, Box], float, float], Values]] = {
     "sway": _sway,
     "breeze": _breeze,
@@ -127,6 +154,7 @@ PRESETS: dict[str, Callable[[Mapping[str, Box], float, float], Values]] = {
     "wave": _wave,
     "bounce": _bounce,
     "flame": _flame,
+    "breathe": _breathe,
 }
 
 

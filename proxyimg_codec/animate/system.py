@@ -135,7 +135,7 @@ class System:
     def _prepare_forces(self) -> None:
         """Wind, drag and impulses of each particle."""
         motion, h = self.motion, self.step_seconds
-        response, drag = np.zeros(len(self.w)), np.full(len(self.w), motion.drag)
+        response, drag = np.zeros(len(self.w)), np.full(len(self.w), float(motion.drag))
         self.impulses: dict[int, list[Real]] = {}
         for body, layer, part in self._moving():
             response[part] = layer.material.wind * body.diagonal * _exposure(body, layer)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ..animate.motion import Motion
     from ..image import Image
 
-PRESETS = ("sway", "breeze", "jelly", "wave", "bounce", "flame")
+PRESETS = ("sway", "breeze", "jelly", "wave", "bounce", "flame", "breathe")
 
 TARGETS = """OUT: .mp4, .webm, .webp, .gif or .apng; a folder/ or name-%04d.png for a file a frame;
 .png with --sheet for a sprite sheet and its .json; .pxi for a picture that carries the motion.
@@ -44,6 +44,8 @@ def arguments() -> argparse.ArgumentParser:
     add("--pin", action="append", metavar="SPOT", help="what stays, instead of what the preset "
         "pins: top, bottom, left, right, border, centre, X,Y,RADIUS or X,Y,W,H; repeatable",
         )  # fmt: skip
+    add("--separate", action="store_true", help="layers that touch need not move as one; with "
+        "--preset")  # fmt: skip
     add("--duration", type=float, metavar="S", help="seconds; 4 by default")
     add("--fps", type=int, help="frames a second; 24 by default")
     add("--seed", type=int, help="another wind")
@@ -97,7 +99,7 @@ def check(args: argparse.Namespace, clip: bool) -> None:
     """
     if args.preset and args.motion:
         raise UsageError("give --preset or --motion, not both")
-    for name in ("layer", "pin"):
+    for name in ("layer", "pin", "separate"):
         if getattr(args, name) and not args.preset:
             raise UsageError(f"--{name} needs --preset; a motion file names layers and pins itself")
     if args.seed is not None and not (args.preset or args.motion):
@@ -106,7 +108,7 @@ def check(args: argparse.Namespace, clip: bool) -> None:
         raise UsageError(f"--jobs {args.jobs}: at least 1")
     if not clip:
         for name in ("size", "background", "quality", "sheet"):
-            if getattr(args, name):
+            if getattr(args, name) not in (None, False):
                 raise UsageError(f"--{name} makes no sense for a .pxi file")
         check_target(args.output, args.force, args.input)
         return
@@ -138,8 +140,8 @@ def moving(image: Image, args: argparse.Namespace) -> Image:
 
 def motion_of(image: Image, args: argparse.Namespace) -> Motion:
     """The motion of the preset or file, with what the flags change."""
-    from ..animate.animate import boxes
-    from ..animate.motion import Motion, preset
+    from ..animate.animate import boxes, preset
+    from ..animate.motion import Motion
 
     given = {
         name: getattr(args, name)
@@ -150,7 +152,7 @@ def motion_of(image: Image, args: argparse.Namespace) -> Motion:
         return replace(Motion.read(args.motion, boxes(image)), **given)
     names = [key(n) for n in args.layer] if args.layer else None
     pins = [spot(text) for text in args.pin] if args.pin else None
-    return preset(args.preset, boxes(image, names), **given, pins=pins)
+    return preset(image, args.preset, names, together=not args.separate, **given, pins=pins)
 
 
 def spot(text: str) -> Any:

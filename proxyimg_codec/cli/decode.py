@@ -34,6 +34,8 @@ def arguments() -> argparse.ArgumentParser:
     add("--width", type=int, help="output width; the height follows")
     add("--height", type=int, help="output height; the width follows")
     add("--region", metavar="X,Y,W,H", help="part of the canvas, in its pixels")
+    add("--time", type=float, metavar="S", help="the picture at S seconds of its motion; by "
+        "default the still")  # fmt: skip
     add("--layer", action="append", metavar="NAME|INDEX", help="draw only this layer; repeatable")
     add("--no-background", action="store_true", help="leave out the back layer")
     add("--bit-depth", type=int, choices=[8, 16, 32], help="bits a sample, 32 = floating point; "
@@ -85,6 +87,8 @@ def decode_file(args: argparse.Namespace) -> Sequence[str]:
     if args.export_onnx is not None:
         export(image, args)
     if rendering:
+        if args.time is not None:
+            image = image.at(args.time)
         if kind in LAYERED:
             layered(image, output, kind, args)
         else:
@@ -101,7 +105,7 @@ def refuse_render_flags(args: argparse.Namespace) -> None:
     Raises:
         UsageError: A rendering flag was given, but nothing is rendered.
     """
-    flags = ("scale", "width", "height", "region", "no_background", "bit_depth")
+    flags = ("scale", "width", "height", "region", "time", "no_background", "bit_depth")
     for name in flags:
         value = getattr(args, name)
         if value is not None and value is not False:
@@ -121,6 +125,8 @@ def refuse_for_layers(args: argparse.Namespace, kind: str) -> None:
     for name in ("scale", "width", "height", "region"):
         if getattr(args, name) is not None:
             raise UsageError(f"--{name}: a {kind} file has the size of the canvas")
+    if args.time is not None and kind == ".svg":
+        raise UsageError("--time: a .svg file has the outlines of the still")
     if args.bit_depth is not None and (kind == ".svg" or args.bit_depth == 32):
         raise UsageError(f"--bit-depth {args.bit_depth} makes no sense for a {kind} file")
 

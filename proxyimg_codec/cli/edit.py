@@ -63,6 +63,7 @@ def arguments() -> argparse.ArgumentParser:
         help="front, back, forward, backward, or a position from the back")  # fmt: skip
     add("--hide", _named("hide"), "NAME", help="stop drawing")
     add("--show", _named("show"), "NAME", help="draw again")
+    add("--still", _named("still"), "NAME", help="forget the motion")
     add("--opacity", _geometry("opacity", value=1), "NAME", "0-1", help="set the opacity")
     add("--texture", _texture, "NAME=SOURCE", help="texture of another layer, of a .pxi file "
         "(FILE.pxi:LAYER) or of a picture; with @shape by outlines instead of boxes")  # fmt: skip
@@ -166,6 +167,7 @@ def listing(image: Any) -> dict[str, Any]:
                 "nodes": None if layer.mesh is None else len(layer.mesh.refined.nodes),
                 "moved": pose.affine,
                 "bent": pose.bent,
+                "moves": layer.track is not None,
                 "opacity": round(pose.opacity / 65535, 4),
                 "hidden": pose.hidden,
                 "recoloured": bool(pose.colour),
@@ -192,7 +194,7 @@ def text(facts: dict[str, Any]) -> str:
     lines = []
     for v in facts["layers"]:
         x0, y0, x1, y1 = v["bounds"]
-        marks = [m for m in ("moved", "bent", "recoloured", "hidden") if v[m]]
+        marks = [m for m in ("moved", "bent", "moves", "recoloured", "hidden") if v[m]]
         if v["opacity"] < 1:
             marks.append(f"opacity {v['opacity']:g}")
         if v["parent"]:

@@ -48,6 +48,7 @@ def describe(c: Container, size: int) -> dict[str, Any]:
     areas = (c.info or {}).get("areas") or [None] * len(c.layers)
     meshes = {m["layer"]: m for m in c.meshes}
     poses = {p["layer"]: p for p in c.poses}
+    moving = c.motion["layers"] if c.motion else []
     layers = []
     for i, (layer, area) in enumerate(zip(c.layers, areas, strict=True)):
         texture = c.texture_of(i)
@@ -65,6 +66,7 @@ def describe(c: Container, size: int) -> dict[str, Any]:
                 "vertices": meshes[i]["vertices"] if i in meshes else None,
                 "pose": _pose(poses[i]) if i in poses else None,
                 "boundary_bytes": len(layer["classes"]) + len(layer["deltas"]),
+                "moves": i in moving,
                 "mesh_bytes": _bytes(meshes.get(i)),
                 "pose_bytes": _bytes(poses.get(i)),
                 "texture_bytes": 0
@@ -93,6 +95,7 @@ def describe(c: Container, size: int) -> dict[str, Any]:
         "layers": layers,
         "networks": networks,
         "planes": planes,
+        "motion": _motion(c),
         "groups": c.tree["groups"] if c.tree else [],
         "edits": [step.operation for step in c.history],
         "metadata": {name: len(block) for name, block in c.blocks.items()},
@@ -105,6 +108,24 @@ def describe(c: Container, size: int) -> dict[str, Any]:
 def _bytes(fields: Mapping[str, Any] | None) -> int:
     """Bytes of the coded parts of a chunk."""
     return sum(len(v) for v in (fields or {}).values() if isinstance(v, bytes))
+
+
+def _motion(c: Container) -> dict[str, Any] | None:
+    """What mOTN says, short of its numbers; None for a picture that does not move."""
+    m = c.motion
+    if m is None:
+        return None
+    return {
+        "seconds": m["duration"] / 1000,
+        "loop": bool(m["loop"]),
+        "fps": m["fps"],
+        "layers": [c.layers[i]["name"] for i in m["layers"]],
+        "bodies": list(m["bodies"]),
+        "intervals": m["intervals"],
+        "modes": m["modes"],
+        "script_bytes": m["size"],
+        "bytes": _bytes(m),
+    }
 
 
 def _pose(fields: Mapping[str, Any]) -> list[str]:
@@ -163,6 +184,13 @@ def text(f: dict[str, Any]) -> str:
             f"planes {i}: {p['size'][0]}x{p['size'][1]} {'grey' if p['components'] == 1 else 'RGB'}"
             f" samples, {p['levels']} levels, step {p['q']:g}, model {p['model']}, "
             f"{p['bytes']} bytes"
+        )
+    if m := f["motion"]:
+        loop = ", in a loop" if m["loop"] else ""
+        lines.append(
+            f"motion: {', '.join(map(repr, m['layers']))} for {m['seconds']:g} s{loop}, made for "
+            f"{m['fps']} frames a second, {m['modes']} shapes, {m['intervals']} intervals, "
+            f"{m['bytes']} bytes"
         )
     if f["groups"]:
         lines.append(f"groups: {', '.join(map(repr, f['groups']))}")

@@ -56,11 +56,17 @@ def _check_motion(c: Container, limits: Limits) -> None:
     for number in numbers:
         if number not in meshed:
             raise FormatError(f"layer {number} moves, but has no mesh", "chunk mOTN")
+    if len(c.motion["bodies"]) != len(numbers):
+        raise FormatError("the number of bodies is not that of the layers", "chunk mOTN")
     if c.head["opaque"] and numbers[0] == 0:
         raise FormatError("the back layer of an opaque file moves", "chunk mOTN")
     if bool(c.motion["size"]) != bool(c.motion["script"]):
         raise FormatError("the script and its size do not fit", "chunk mOTN")
     limits.check("metadata_bytes", c.motion["size"])
+    # What nodes cost is checked once the meshes are decoded.
+    coefficients = len(numbers) * (c.motion["intervals"] + (0 if c.motion["loop"] else 3))
+    limits.check("wavefronts", coefficients + 2)
+    limits.check("motion", c.motion["modes"] * coefficients)
 
 
 def _check_networks(c: Container, limits: Limits) -> None:

@@ -12,6 +12,8 @@ FIELDS = (
     Field("unit", "int", "Shapes are multiples of 2^-unit canvas pixels.", 0, 6),
     Field("layers", "ints", "Ascending numbers of the layers that move; each has a mesh.",
           0, 1 << 16),
+    Field("bodies", "ints", "For each of these layers the number of the body that it moves with.",
+          0, 1 << 16),
     Field("modes", "int", "Curves and shapes of each of these layers.", 1, 64),
     Field("curve_classes", "bin", "Coded array [modes, 1, layers times coefficients] of bit "
           "lengths of steps of the curves."),

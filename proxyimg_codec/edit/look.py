@@ -47,6 +47,12 @@ def show(image: Image, layer: str | int) -> Image:
     return _posed(image, layer, hidden=False)
 
 
+@operation("still", layer=TARGET)
+def still(image: Image, layer: str | int) -> Image:
+    """Forgets the motion of a layer."""
+    return substituted(image, [replace(v, track=None) for v in shown_together(image, layer)])
+
+
 def _posed(image: Image, target: str | int, **values: Any) -> Image:
     layers = shown_together(image, target)
     return substituted(image, [replace(v, pose=replace(v.pose, **values)) for v in layers])

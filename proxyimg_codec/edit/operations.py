@@ -227,6 +227,7 @@ def changed(
         channels=max(image.channels, *(v.texture.channels(kept) for v in layers)),
         opaque=image.opaque if layers[0] is image.layers[0] else _covers(layers[0], kept),
         groups=image.groups if groups is None else groups,
+        timeline=image.timeline if any(v.track for v in layers) else None,
         info=_info(image, layers),
         extra=tuple(chunk for chunk in image.extra if chunk.safe_to_copy),
     )
@@ -235,6 +236,7 @@ def changed(
 def _covers(back: Layer, networks: Sequence[Network]) -> bool:
     """Whether a back layer covers the whole canvas and lets nothing through."""
     still = back.boundary is None and not back.pose.affine and back.pose.nodes is None
+    still = still and back.track is None
     visible = back.pose.opacity == OPACITY_MAX and not back.pose.hidden
     return still and visible and back.texture.channels(networks) == 3
 

@@ -44,7 +44,10 @@ def decode(
         FormatError: Corrupt streams, a wrong length, or a class that is larger than needed.
     """
     stored = np.ones((rows, count), bool)
-    classes = arrays.decode(coded, (channels, rows, count), 4, stored).ravel().astype(np.int64)
+    try:
+        classes = arrays.decode(coded, (channels, rows, count), 4, stored).ravel().astype(np.int64)
+    except FormatError as error:
+        raise FormatError(str(error), where) from None
     return _read(raw, classes, where).reshape(channels, rows * count)
 
 

@@ -61,6 +61,7 @@ class Pose:
         colour: Rows of a 3 x 4 matrix in 2**-12 that maps colour and one to colour, or ().
         sway: int64 [N, 2] further displacement of each node in 1/1024 canvas pixel, at a moment of
             a timeline, or None.
+        body: The body that it sways with, or None: layers of one body sway as one.
     """
 
     matrix: tuple[int, int, int, int] = (_UNIT, 0, 0, _UNIT)
@@ -71,6 +72,7 @@ class Pose:
     hidden: bool = False
     colour: tuple[int, ...] = ()
     sway: Ints | None = None
+    body: int | None = None
 
     @property
     def affine(self) -> bool:
@@ -109,8 +111,10 @@ class Pose:
 
     def still(self, other: Pose) -> bool:
         """Whether layers in these poses lie to each other as at rest, and are drawn in full."""
-        return (self.matrix, self.shift) == (other.matrix, other.shift) and not any(
-            p.bent or p.hidden or p.opacity != OPACITY_MAX for p in (self, other)
+        alike = (self.matrix, self.shift, self.body) == (other.matrix, other.shift, other.body)
+        return alike and not any(
+            p.nodes is not None or p.places is not None or p.hidden or p.opacity != OPACITY_MAX
+            for p in (self, other)
         )
 
     @property
@@ -145,7 +149,7 @@ class Pose:
             return self
         shift = FRACTION_BITS - NODE_BITS
         nodes = (self.displacements + (1 << (shift - 1))) >> shift
-        return replace(self, nodes=nodes if nodes.any() else None, sway=None)
+        return replace(self, nodes=nodes if nodes.any() else None, sway=None, body=None)
 
 
 REST = Pose()

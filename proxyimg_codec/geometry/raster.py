@@ -37,11 +37,10 @@ def rasterize(
     out = np.full(height * width, -1, np.int32)
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    number = np.arange(len(corners))
-    order = np.lexsort((-number, area > 0))
-    x = corners[..., 0]
-    near = (area != 0) & (x.max(1) > x0) & (x.min(1) < x0 + width)
-    order = order[near[order]]
+    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+    near = ((high > (x0, y0)) & (low < (x0 + width, y0 + height))).all(1)
+    number = np.flatnonzero(near & (area != 0))
+    order = number[np.lexsort((-number, area[number] > 0))]
     covered = 0
     for part in _batches(_rows(corners[order], y0, height)):
         triangle, row, first, last = _spans(corners[order[part]], x0, y0, width, height)

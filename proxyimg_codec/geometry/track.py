@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FormatError, UsageError
+from ..limits import DEFAULT_LIMITS, Limits
 from . import deltas
 from .mesh import FRACTION_BITS, Refined
-from .pose import residuals, restored
+from .pose import POINT_MAX, residuals, restored
 
 Ints = NDArray[np.int64]
 
@@ -48,7 +49,7 @@ class Timeline:
     """When the layers of a picture move.
 
     Attributes:
-        duration: Milliseconds, 1..600,000.
+        duration: Milliseconds, 1..3,600,000.
         fps: Frames a second that it was made for, 1..240.
         loop: Whether its end is its beginning.
         intervals: Number of equal intervals that it is cut into.
@@ -84,7 +85,7 @@ class Timeline:
         Raises:
             UsageError: The time is not a number.
         """
-        if not math.isfinite(seconds):
+        if not math.isfinite(seconds * MICROSECONDS):
             raise UsageError(f"t = {seconds} is not a time in seconds")
         end = self.duration * 1000
         at = round(seconds * MICROSECONDS)
@@ -118,13 +119,15 @@ class Track:
     Attributes:
         curves: int64 [M, K] coefficients of M curves, in 2**-CURVE_BITS.
         shapes: int64 [M, N, 2] displacements of all nodes in units of the timeline.
+        body: Number of the body that the layer moves with; layers of one body move as one.
     """
 
     curves: Ints
     shapes: Ints
+    body: int = 0
 
     def at(self, timeline: Timeline, seconds: float) -> Ints:
-        """Displacements int64 [N, 2] in 1/1024 canvas pixel at a time; exact, half up.
+        """Displacements int64 [N, 2] in 1/1024 canvas pixel at a time; exact, half up, clamped.
 
         Raises:
             UsageError: The time is not a number.
@@ -133,15 +136,33 @@ class Track:
         total = self.curves[:, index] @ weight << (_VALUE_BITS - CURVE_BITS)
         values = (total + SUM // 2) // SUM
         moved = np.tensordot(values, self.shapes, 1) << (FRACTION_BITS - timeline.unit)
-        return np.asarray((moved + (1 << (_VALUE_BITS - 1))) >> _VALUE_BITS)
+        rounded = (moved + (1 << (_VALUE_BITS - 1))) >> _VALUE_BITS
+        return np.asarray(np.clip(rounded, -POINT_MAX, POINT_MAX))
 
 
 Coded = tuple[bytes, bytes]
 """Classes and deltas of an array of signed integers."""
 
 
+def check_size(limits: Limits, modes: int, coefficients: int, nodes: int = 0) -> None:
+    """Checks what tracks cost: all coefficients of a mode, and all nodes of the layers that move.
+
+    Raises:
+        LimitError: That exceeds `limits`.
+    """
+    limits.check("wavefronts", max(coefficients + 2, nodes + 2 * modes))
+    limits.check("motion", modes * (coefficients + 2 * nodes))
+
+
 def encode(tracks: list[tuple[Track, Refined]]) -> tuple[Coded, Coded]:
-    """Curves [M, layers * K] less the coefficient before; shapes [2, M, nodes] as in POSE."""
+    """Curves [M, layers * K] less the coefficient before; shapes [2, M, nodes] as in POSE.
+
+    Raises:
+        LimitError: They are more than readers accept by default.
+    """
+    coefficients = sum(track.curves.shape[1] for track, _ in tracks)
+    nodes = sum(len(refined.nodes) for _, refined in tracks)
+    check_size(DEFAULT_LIMITS, len(tracks[0][0].curves), coefficients, nodes)
     curves, shapes = [], []
     for track, refined in tracks:
         curves.append(np.diff(track.curves, axis=1, prepend=0))
@@ -152,15 +173,19 @@ def encode(tracks: list[tuple[Track, Refined]]) -> tuple[Coded, Coded]:
 
 
 def decode(
-    curves: Coded, shapes: Coded, modes: int, timeline: Timeline, meshes: list[Refined], where: str
-) -> list[Track]:
+    curves: Coded, shapes: Coded, modes: int, timeline: Timeline, meshes: list[Refined], where: str,
+    limits: Limits = DEFAULT_LIMITS,
+) -> list[Track]:  # fmt: skip
     """Inverse of `encode`.
 
     Raises:
         FormatError: Corrupt streams, or a number that is out of range.
+        LimitError: They exceed `limits`.
     """
-    steps = deltas.decode(*curves, modes, len(meshes) * timeline.coefficients, where)
+    coefficients = len(meshes) * timeline.coefficients
     nodes = [len(m.nodes) for m in meshes]
+    check_size(limits, modes, coefficients, sum(nodes))
+    steps = deltas.decode(*curves, modes, coefficients, where)
     whole = deltas.decode(*shapes, 2, sum(nodes), where, modes).reshape(2, modes, -1)
     tracks = []
     for curve, part, refined in zip(

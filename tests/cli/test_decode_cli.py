@@ -1,6 +1,7 @@
 """pxi-decode: every flag, and every way to fail."""
 
 import os
+import zipfile
 
 import numpy as np
 import pytest
@@ -140,6 +141,44 @@ def test_transparency_is_written(tool, soft_pxi, tmp_path):
     assert pixels[:, 20:, 3].min() > pixels[:, :4, 3].max()
     for name in ("a.ppm", "a.jpg"):
         assert "PNG" in tool("decode", soft_pxi, tmp_path / name, code=2).err
+
+
+# Time
+
+
+@pytest.mark.parametrize("t", [0.4, 0, -0.35, 1e9])
+def test_a_time_of_a_motion(tool, moving_pxi, tmp_path, t):
+    image = pxi.open(moving_pxi)
+    tool("decode", moving_pxi, tmp_path / "a.png", "--time", t, "--layer", "disc", "--width", 90)
+    pixels = read(tmp_path / "a.png").pixels
+    np.testing.assert_array_equal(pixels, image.render(t=t, layers=["disc"], width=90))
+    assert (pixels != image.render(layers=["disc"], width=90)).any()
+    tool("decode", moving_pxi, tmp_path / "b.png")
+    np.testing.assert_array_equal(read(tmp_path / "b.png").pixels, image.render())
+
+
+def test_the_layers_of_a_moment(tool, moving_pxi, tmp_path):
+    tool("decode", moving_pxi, tmp_path / "a.ora", "--time", "0.4")
+    with zipfile.ZipFile(tmp_path / "a.ora") as archive:
+        (tmp_path / "a.png").write_bytes(archive.read("mergedimage.png"))
+    merged = read(tmp_path / "a.png").pixels[..., :3].astype(int)
+    assert abs(merged - pxi.open(moving_pxi).render(t=0.4)).max() <= 2
+
+
+@pytest.mark.parametrize("t", ["nan", "inf", "-inf", "1e305", "soon", ""])
+def test_what_is_no_time(tool, moving_pxi, tmp_path, t):
+    tool("decode", moving_pxi, tmp_path / "a.png", f"--time={t}", code=2)
+    assert not os.listdir(tmp_path)
+
+
+def test_a_time_of_what_does_not_move(tool, small_pxi, moving_pxi, tmp_path):
+    err = tool("decode", small_pxi, tmp_path / "a.png", "--time", "0", code=2).err
+    assert "does not move" in err
+    err = tool("decode", moving_pxi, tmp_path / "a.svg", "--time", "0.4", code=2).err
+    assert "--time" in err
+    err = tool("decode", moving_pxi, "--export-onnx", tmp_path / "a", "--time", "0", code=2).err
+    assert "--time" in err
+    assert not os.listdir(tmp_path)
 
 
 # ONNX

@@ -42,6 +42,7 @@ FLAGS = [
     (["--order", "disc", "1"], {"op": "order", "layer": "disc", "to": 1}),
     (["--order", "bar", "front"], {"op": "order", "layer": "bar", "to": "front"}),
     (["--hide", "disc"], {"op": "hide", "layer": "disc"}),
+    (["--still", "disc"], {"op": "still", "layer": "disc"}),
     (["--opacity", "disc", ".5"], {"op": "opacity", "layer": "disc", "value": 0.5}),
     (["--texture", "disc=bar"], {"op": "texture", "layer": "disc", "source": "bar"}),
     (["--texture", "disc=bar@shape"],

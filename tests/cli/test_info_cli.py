@@ -143,3 +143,19 @@ def test_edits_meshes_and_shared_textures_are_told(tool, small_pxi, tmp_path):
     assert "moved and translucent" in text
     assert "shared with layer 2" in text
     assert "edit 4: " in text
+
+
+def test_motion_is_told(tool, moving_pxi, small_pxi):
+    facts = json.loads(tool("info", moving_pxi, "--json").out)
+    motion = facts["motion"]
+    size = motion.pop("bytes")
+    assert motion == {
+        "seconds": 1.5, "loop": True, "fps": 8, "layers": ["bar", "disc"],
+        "bodies": [1, 2], "intervals": 5, "modes": 2, "script_bytes": 33,
+    }  # fmt: skip
+    assert 0 < facts["chunk_bytes"]["mOTN"] - size < 60
+    assert [v["moves"] for v in facts["layers"]] == [False, True, True]
+    text = tool("info", moving_pxi).out.decode()
+    assert "motion: 'bar', 'disc' for 1.5 s, in a loop, made for 8 frames a second" in text
+    assert json.loads(tool("info", small_pxi, "--json").out)["motion"] is None
+    assert "motion" not in tool("info", small_pxi).out.decode()

@@ -9,6 +9,7 @@ from proxyimg_codec.animate.bake import bake
 from proxyimg_codec.errors import FormatError, LimitError, UsageError
 from proxyimg_codec.geometry import track
 from proxyimg_codec.geometry.mesh import Base, Mesh
+from proxyimg_codec.geometry.pose import POINT_MAX
 from proxyimg_codec.geometry.track import SUM, Timeline, Track
 
 LOOP = Timeline(2000, 24, True, 8, 3)
@@ -94,13 +95,18 @@ def test_numbers_that_are_too_large_are_refused(curve, shape):
 def test_the_largest_numbers_do_not_overflow():
     high = Track(np.full((64, 8), track.CURVE_MAX - 1), np.full((64, 1, 2), track.SHAPE_MAX - 1))
     got = high.at(Timeline(1, 1, True, 8, 0), 0.0003)
-    want = 64 * (track.CURVE_MAX - 1) * (track.SHAPE_MAX - 1) * 1024 // 256
-    assert (np.abs(got - want) <= want * 1e-6).all()
+    assert (got == POINT_MAX).all()
+    low = Track(-high.curves, high.shapes).at(Timeline(1, 1, True, 8, 0), 0.0003)
+    assert (low == -POINT_MAX).all()
+    below = Track(np.full((64, 8), 4), np.full((64, 1, 2), track.SHAPE_MAX - 1))
+    assert (below.at(Timeline(1, 1, True, 8, 0), 0.0003) == (track.SHAPE_MAX - 1) << 10).all()
 
 
 def test_a_time_is_a_number():
-    with pytest.raises(UsageError, match="nan is not a time"):
-        LOOP.taps(float("nan"))
+    for wrong in ("nan", "-inf", "1e306"):
+        with pytest.raises(UsageError, match="is not a time"):
+            LOOP.taps(float(wrong))
+    assert LOOP.taps(1e300)[0].max() < 8
 
 
 def wave(count, loop):
