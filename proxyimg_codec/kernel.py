@@ -240,7 +240,7 @@ def decode(
     )  # fmt: skip
     used = lib.pxi_decode(ct.byref(task))
     if used < 0:
-        raise FormatError("entropy-coded stream ends too early")
+        raise FormatError("entropy-coded stream ends too early", rule="ENT-6")
     decoder.states[:] = states
     decoder.used = used
 

@@ -34,6 +34,7 @@ class Limits:
         motion: Coefficients of all curves, and coordinates of all shapes, together.
         parameters: Parameters of all networks together.
         metadata_bytes: One metadata block after decompression.
+        references: Chunks of all states of a history together.
         output_pixels: Pixels of one rendered picture.
     """
 
@@ -55,6 +56,7 @@ class Limits:
     motion: int = 1 << 22
     parameters: int = 1 << 22
     metadata_bytes: int = 1 << 26
+    references: int = 1 << 20
     output_pixels: int = 1 << 28
 
     def check(self, name: str, value: int) -> None:
@@ -63,7 +65,8 @@ class Limits:
         if value > allowed:
             raise LimitError(
                 f"{name.replace('_', ' ')}: {value} exceeds the limit of {allowed}; "
-                f"raise it with Limits({name}=...) if you trust the file"
+                f"raise it with Limits({name}=...) if you trust the file",
+                rule="SEC-2",
             )
 
 

@@ -143,7 +143,7 @@ def unpack(c: Container, limits: Limits, damage: tuple[str, ...] = ()) -> Image:
         v["layer"]: posing.decode(v, meshes.get(v["layer"]), f"chunk POSE {i}")
         for i, v in enumerate(c.poses)
     }
-    timeline, moving = _moving(c.motion, meshes, limits)
+    timeline, moves = moving(c.motion, meshes, limits)
     groups = c.tree["groups"] if c.tree else []
     nodes = [None, *(v["name"] for v in c.layers), *groups]
     parents = [nodes[k] for k in c.tree["parents"]] if c.tree else [None] * len(c.layers)
@@ -169,7 +169,7 @@ def unpack(c: Container, limits: Limits, damage: tuple[str, ...] = ()) -> Image:
             v["sampling"],
             poses.get(i, REST),
             parent,
-            moving.get(i),
+            moves.get(i),
         )
         for i, (v, box, outline, texture, parent) in enumerate(
             zip(c.layers, boxes, outlines, textures, parents[: len(c.layers)], strict=True)
@@ -183,20 +183,25 @@ def unpack(c: Container, limits: Limits, damage: tuple[str, ...] = ()) -> Image:
     )  # fmt: skip
 
 
-def _moving(
+def moving(
     fields: Mapping[str, Any] | None, meshes: Mapping[int, Mesh], limits: Limits
 ) -> tuple[Timeline | None, dict[int, Track]]:
-    """The timeline of mOTN, and the track of each layer that moves, by its number."""
+    """The timeline of mOTN, and the track of each layer that moves, by its number.
+
+    Raises:
+        FormatError: The chunk is corrupt.
+        LimitError: It exceeds `limits`.
+    """
     if fields is None:
         return None, {}
     where = "chunk mOTN"
     script = b""
     if fields["size"]:
-        script = meta.decompressed(fields["size"], fields["script"], where, limits)
+        script = meta.decompressed(fields["size"], fields["script"], where, limits, "MOT-1")
     try:
         text = script.decode()
     except UnicodeDecodeError:
-        raise FormatError("the script is not UTF-8", where) from None
+        raise FormatError("the script is not UTF-8", where, rule="MOT-10") from None
     numbers = fields["layers"]
     timeline = Timeline(
         fields["duration"], fields["fps"], bool(fields["loop"]), fields["intervals"],

@@ -77,11 +77,13 @@ def _usable(
         elif k not in wrong:
             kept += [chunk] if chunk.type not in (undo.TYPE, _END.type) else []
         elif chunk.critical and not wrong[k]:
-            raise FormatError("CRC mismatch, and nothing can be done without it", where)
+            raise FormatError(
+                "CRC mismatch, and nothing can be done without it", where, rule="CON-6"
+            )
         else:
             notes.append(f"{where} is left out")
     if not kept or kept[0].type != head.TYPE:
-        raise FormatError("too little of the file is there: not even the chunk HEAD")
+        raise FormatError("too little of the file is there: not even the chunk HEAD", rule="CON-11")
     header = unpack(head.FIELDS, kept[0].payload, "chunk HEAD")
     textures = sum(c.type == texr.TYPE for c in kept)
     if textures < header["layers"]:

@@ -27,15 +27,19 @@ def check(c: Container, limits: Limits) -> None:
     counts = {"layers": len(c.layers), "networks": len(c.networks)}
     for name, count in counts.items():
         if count != c.head[name]:
-            raise FormatError(f"HEAD announces {c.head[name]} {name}, the file has {count}")
+            raise FormatError(
+                f"HEAD announces {c.head[name]} {name}, the file has {count}", rule="CHK-4"
+            )
     if len(c.textures) != len(c.layers):
-        raise FormatError(f"{len(c.layers)} layers, but {len(c.textures)} textures")
+        raise FormatError(f"{len(c.layers)} layers, but {len(c.textures)} textures", rule="CHK-4")
     if c.head["depth"] not in (8, 16):
-        raise FormatError("depth is neither 8 nor 16", "chunk HEAD")
+        raise FormatError("depth is neither 8 nor 16", "chunk HEAD", rule="CHK-2")
     if len({layer["name"] for layer in c.layers}) < len(c.layers):
-        raise FormatError("two layers have the same name", "chunk LAYR")
+        raise FormatError("two layers have the same name", "chunk LAYR", rule="CHK-5")
     if c.info and len(c.info["areas"]) not in (0, len(c.layers)):
-        raise FormatError("the number of areas is not that of the layers", "chunk iNFO")
+        raise FormatError(
+            "the number of areas is not that of the layers", "chunk iNFO", rule="CHK-17"
+        )
     limits.check("segments", sum(sum(layer["segments"]) for layer in c.layers))
     limits.check("gates", sum(values["gates"] for values in c.meshes))
     _check_layers(c)
@@ -52,16 +56,20 @@ def _check_motion(c: Container, limits: Limits) -> None:
         return
     numbers, meshed = c.motion["layers"], {values["layer"] for values in c.meshes}
     if not numbers or any(b <= a for a, b in pairwise(numbers)):
-        raise FormatError("the layers that move are none or not ascending", "chunk mOTN")
+        raise FormatError(
+            "the layers that move are none or not ascending", "chunk mOTN", rule="MOT-1"
+        )
     for number in numbers:
         if number not in meshed:
-            raise FormatError(f"layer {number} moves, but has no mesh", "chunk mOTN")
+            raise FormatError(f"layer {number} moves, but has no mesh", "chunk mOTN", rule="MOT-1")
     if len(c.motion["bodies"]) != len(numbers):
-        raise FormatError("the number of bodies is not that of the layers", "chunk mOTN")
+        raise FormatError(
+            "the number of bodies is not that of the layers", "chunk mOTN", rule="MOT-1"
+        )
     if c.head["opaque"] and numbers[0] == 0:
-        raise FormatError("the back layer of an opaque file moves", "chunk mOTN")
+        raise FormatError("the back layer of an opaque file moves", "chunk mOTN", rule="MOT-1")
     if bool(c.motion["size"]) != bool(c.motion["script"]):
-        raise FormatError("the script and its size do not fit", "chunk mOTN")
+        raise FormatError("the script and its size do not fit", "chunk mOTN", rule="MOT-1")
     limits.check("metadata_bytes", c.motion["size"])
     # What nodes cost is checked once the meshes are decoded.
     coefficients = len(numbers) * (c.motion["intervals"] + (0 if c.motion["loop"] else 3))
@@ -73,7 +81,7 @@ def _check_networks(c: Container, limits: Limits) -> None:
     parameters = 0
     for net in c.networks:
         if net["channels"] > c.head["channels"]:
-            raise FormatError("more channels than HEAD has", "chunk NETW")
+            raise FormatError("more channels than HEAD has", "chunk NETW", rule="CHK-12")
         width = net["hidden"]
         encoded = net["dim"] * (2 * net["octaves"] + 1)
         parameters += (encoded + 1) * width + (net["depth"] - 1) * (width + 1) * width
@@ -95,31 +103,39 @@ def _check_planes(c: Container, limits: Limits) -> None:
             continue
         for number in (texture["planes"], texture["alpha"] - 1):
             if number >= len(c.planes):
-                raise FormatError(f"planes {number} do not exist", "chunk TEXR")
+                raise FormatError(f"planes {number} do not exist", "chunk TEXR", rule="PYR-3")
             if number > used:
-                raise FormatError("planes are not in the order of their first use", "chunk PLAN")
+                raise FormatError(
+                    "planes are not in the order of their first use", "chunk PLAN", rule="PYR-3"
+                )
             used = max(used, number + 1)
     if used < len(c.planes):
-        raise FormatError(f"planes {used} are not used", "chunk PLAN")
+        raise FormatError(f"planes {used} are not used", "chunk PLAN", rule="PYR-3")
 
 
 def _check_textures(c: Container, limits: Limits) -> None:
     codes = filled = covered = 0
     for i, (layer, own) in enumerate(zip(c.layers, c.textures, strict=True)):
         if min(layer["box"][2:]) < 1:
-            raise FormatError("the box is empty", "chunk LAYR")
+            raise FormatError("the box is empty", "chunk LAYR", rule="CHK-6")
         if own["coder"] == texr.SHARED and own["texture"] >= i:
-            raise FormatError("a shared texture is not that of an earlier layer", "chunk TEXR")
+            raise FormatError(
+                "a shared texture is not that of an earlier layer", "chunk TEXR", rule="CHK-15"
+            )
         texture = c.texture_of(i)
         node = (layer["sampling"] == 1, c.layers[own.get("texture", i)]["sampling"] == 1)
         if node[0] != node[1]:
-            raise FormatError("a shared texture has another number of features", "chunk TEXR")
+            raise FormatError(
+                "a shared texture has another number of features", "chunk TEXR", rule="CHK-15"
+            )
         if texture["coder"] == texr.SHARED:
-            raise FormatError("a shared texture is shared itself", "chunk TEXR")
+            raise FormatError("a shared texture is shared itself", "chunk TEXR", rule="CHK-15")
         pyramid = texture["coder"] == texr.PYRAMID
         channels = _check_view(c, layer, texture) if pyramid else _check_implicit(c, layer, texture)
         if i == 0 and c.head["opaque"] and channels != 3:
-            raise FormatError("the back layer of an opaque file gives alpha", "chunk TEXR")
+            raise FormatError(
+                "the back layer of an opaque file gives alpha", "chunk TEXR", rule="CHK-3"
+            )
         if own is not texture:
             continue
         if pyramid:
@@ -141,30 +157,36 @@ def _check_textures(c: Container, limits: Limits) -> None:
 def _check_implicit(c: Container, layer: Values, texture: Values) -> int:
     """Checks an implicit texture; its channels."""
     if texture["network"] >= len(c.networks):
-        raise FormatError(f"network {texture['network']} does not exist", "chunk TEXR")
+        raise FormatError(
+            f"network {texture['network']} does not exist", "chunk TEXR", rule="CHK-14"
+        )
     net = c.networks[texture["network"]]
     if layer["sampling"] == 1 and net["dim"] % 2:
-        raise FormatError("node sampling needs an even number of features", "chunk LAYR")
+        raise FormatError(
+            "node sampling needs an even number of features", "chunk LAYR", rule="CHK-7"
+        )
     return int(net["channels"])
 
 
 def _check_view(c: Container, layer: Values, texture: Values) -> int:
     """Checks a pyramid texture, whose planes exist; its channels."""
     if layer["sampling"]:
-        raise FormatError("node sampling needs an implicit texture", "chunk LAYR")
+        raise FormatError("node sampling needs an implicit texture", "chunk LAYR", rule="CHK-7")
     columns, rows = c.planes[texture["planes"]]["size"]
     x, y, width, height = texture["part"]
     if min(width, height) < 1 or x + width > columns or y + height > rows:
-        raise FormatError("the part is empty or leaves the planes", "chunk TEXR")
+        raise FormatError("the part is empty or leaves the planes", "chunk TEXR", rule="PYR-38")
     if texture["cell"] and not texture["mask"]:
-        raise FormatError("cells without a mask", "chunk TEXR")
+        raise FormatError("cells without a mask", "chunk TEXR", rule="PYR-39")
     if not texture["alpha"]:
         return 3
     alpha = c.planes[texture["alpha"] - 1]
     if alpha["components"] != 1 or alpha["size"] != [columns, rows]:
-        raise FormatError("planes of alpha are not grey, or of another size", "chunk TEXR")
+        raise FormatError(
+            "planes of alpha are not grey, or of another size", "chunk TEXR", rule="PYR-38"
+        )
     if c.head["channels"] != 4:
-        raise FormatError("more channels than HEAD has", "chunk TEXR")
+        raise FormatError("more channels than HEAD has", "chunk TEXR", rule="PYR-38")
     return 4
 
 
@@ -175,27 +197,35 @@ def _check_cuts(c: Container, number: int) -> None:
     if not cuts:
         return
     if texture["mask"]:
-        raise FormatError("a mask and cuts", "chunk TEXR")
+        raise FormatError("a mask and cuts", "chunk TEXR", rule="PYR-40")
     if texture["part"][2:] != c.layers[number]["box"][2:]:
-        raise FormatError("a part with cuts has not the size of the box", "chunk TEXR")
+        raise FormatError(
+            "a part with cuts has not the size of the box", "chunk TEXR", rule="PYR-40"
+        )
     if cuts != sorted(set(cuts)) or cuts[0] < number or cuts[-1] >= len(c.layers):
-        raise FormatError("cuts do not ascend, lie behind, or do not exist", "chunk TEXR")
+        raise FormatError(
+            "cuts do not ascend, lie behind, or do not exist", "chunk TEXR", rule="PYR-40"
+        )
     if not all(c.layers[k]["segments"] for k in cuts):
-        raise FormatError("a layer that cuts has no boundary", "chunk TEXR")
+        raise FormatError("a layer that cuts has no boundary", "chunk TEXR", rule="PYR-40")
 
 
 def _check_layers(c: Container) -> None:
     """Checks what MESH, POSE and LAYR must agree on."""
-    for type_, values in ((mesh.TYPE, c.meshes), (pose.TYPE, c.poses)):
+    for type_, values, rule in (
+        (mesh.TYPE, c.meshes, "CHK-9"), (pose.TYPE, c.poses, "CHK-10"),
+    ):  # fmt: skip
         numbers = [v["layer"] for v in values]
         if numbers != sorted(set(numbers)) or (numbers and numbers[-1] >= len(c.layers)):
-            raise FormatError("layers do not ascend, or do not exist", f"chunk {type_}")
+            raise FormatError("layers do not ascend, or do not exist", f"chunk {type_}", rule=rule)
     meshed = {v["layer"] for v in c.meshes}
     for i, layer in enumerate(c.layers):
         if layer["sampling"] > 3:
-            raise UnsupportedError(f"chunk LAYR: sampling {layer['sampling']} is not known")
+            raise UnsupportedError(
+                f"chunk LAYR: sampling {layer['sampling']} is not known", rule="CHK-7"
+            )
         if layer["sampling"] in (1, 2) and i not in meshed:
-            raise FormatError("node sampling needs a mesh", "chunk LAYR")
+            raise FormatError("node sampling needs a mesh", "chunk LAYR", rule="CHK-7")
     if c.head["opaque"]:
         back = c.poses[0] if c.poses and c.poses[0]["layer"] == 0 else None
         still = back is None or (
@@ -206,7 +236,9 @@ def _check_layers(c: Container) -> None:
             and not back["node_classes"]
         )
         if c.layers[0]["segments"] or not still:
-            raise FormatError("the back layer of an opaque file does not cover the canvas")
+            raise FormatError(
+                "the back layer of an opaque file does not cover the canvas", rule="CHK-3"
+            )
 
 
 def _check_tree(c: Container) -> None:
@@ -214,9 +246,13 @@ def _check_tree(c: Container) -> None:
         return
     groups, parents = c.tree["groups"], c.tree["parents"]
     if len({*groups, *(v["name"] for v in c.layers)}) < len(groups) + len(c.layers):
-        raise FormatError("a group has the name of another group or a layer", "chunk tREE")
+        raise FormatError(
+            "a group has the name of another group or a layer", "chunk tREE", rule="CHK-18"
+        )
     if len(parents) != len(c.layers) + len(groups) or max(parents) > len(parents):
-        raise FormatError("the parents do not fit the layers and groups", "chunk tREE")
+        raise FormatError(
+            "the parents do not fit the layers and groups", "chunk tREE", rule="CHK-18"
+        )
     # Each walk upwards ends where another has been: the time is linear in the nodes.
     walked = [0] * (len(parents) + 1)
     for start in range(1, len(walked)):
@@ -225,4 +261,4 @@ def _check_tree(c: Container) -> None:
             walked[node] = start
             node = parents[node - 1]
         if node and walked[node] == start:
-            raise FormatError("a group or layer is part of itself", "chunk tREE")
+            raise FormatError("a group or layer is part of itself", "chunk tREE", rule="CHK-19")

@@ -66,19 +66,20 @@ def write(chunks: Iterable[Chunk], version: tuple[int, int] = VERSION) -> bytes:
 
 def _check_prefix(data: bytes) -> None:
     if not data:
-        raise FormatError("the file is empty")
+        raise FormatError("the file is empty", rule="CON-2")
     if data[: len(SIGNATURE)] != SIGNATURE[: len(data)]:
-        raise FormatError("not a .pxi file: the signature is missing", offset=0)
+        raise FormatError("not a .pxi file: the signature is missing", offset=0, rule="CON-2")
     if len(data) < PREFIX.size:
-        raise FormatError("truncated in the signature", offset=len(data))
+        raise FormatError("truncated in the signature", offset=len(data), rule="CON-2")
     _, major, minor, reserved = PREFIX.unpack_from(data)
     if (major, minor) not in READABLE:
         raise UnsupportedError(
             f"the file has format version {major}.{minor}, this program reads "
-            f"{', '.join(f'{a}.{b}' for a, b in READABLE)}; update proxyimg-codec"
+            f"{', '.join(f'{a}.{b}' for a, b in READABLE)}; update proxyimg-codec",
+            rule="CON-3",
         )
     if reserved:
-        raise FormatError("reserved field is not zero", offset=10)
+        raise FormatError("reserved field is not zero", offset=10, rule="CON-2")
 
 
 def _valid_type(raw: bytes) -> bool:
@@ -99,23 +100,27 @@ def read(data: bytes, limits: Limits = DEFAULT_LIMITS) -> list[Chunk]:
     at = PREFIX.size
     while at < len(data):
         if chunks and chunks[-1].type == "TAIL":
-            raise FormatError("bytes follow the last chunk", offset=at)
+            raise FormatError("bytes follow the last chunk", offset=at, rule="CON-13")
         limits.check("chunks", len(chunks) + 1)
         if len(data) - at < FRAME.size + 4:
-            raise FormatError("truncated in a chunk header", offset=at)
+            raise FormatError("truncated in a chunk header", offset=at, rule="CON-7")
         raw, length = FRAME.unpack_from(data, at)
         if not _valid_type(raw):
-            raise FormatError("chunk type is not four letters with the third upper case", offset=at)
+            raise FormatError(
+                "chunk type is not four letters with the third upper case", offset=at, rule="CON-8"
+            )
         name = f"chunk {raw.decode()}"
         end = at + FRAME.size + length
         if length > CHUNK_MAX or end + 4 > len(data):
-            raise FormatError("truncated: the chunk runs past the end of the file", name, at)
+            raise FormatError(
+                "truncated: the chunk runs past the end of the file", name, at, rule="CON-7"
+            )
         if zlib.crc32(data[at:end]) != int.from_bytes(data[end : end + 4], "little"):
-            raise FormatError("CRC mismatch: the file is damaged", name, at)
+            raise FormatError("CRC mismatch: the file is damaged", name, at, rule="CON-6")
         chunks.append(Chunk(raw.decode(), data[at + FRAME.size : end], at))
         at = end + 4
     if not chunks or chunks[-1].type != "TAIL":
-        raise FormatError("truncated: the TAIL chunk is missing", offset=at)
+        raise FormatError("truncated: the TAIL chunk is missing", offset=at, rule="CON-13")
     return chunks
 
 

@@ -87,14 +87,16 @@ def unpack(fields: tuple[Field, ...], payload: bytes, where: str) -> dict[str, A
             max_array_len=1 << 20,
         )  # fmt: skip
     except (ValueError, TypeError, RecursionError, msgpack.UnpackException) as error:
-        raise FormatError(f"payload is not valid msgpack ({type(error).__name__})", where) from None
+        raise FormatError(
+            f"payload is not valid msgpack ({type(error).__name__})", where, rule="CON-14"
+        ) from None
     values = _by_key(fields, content, where)
     for field in fields:
         problem = field.problem(values[field.key])
         if problem:
-            raise FormatError(f"field {field.key!r} {problem}", where)
+            raise FormatError(f"field {field.key!r} {problem}", where, rule="CHK-1")
     if msgpack.packb(content, use_bin_type=True) != payload:
-        raise FormatError("payload is not in canonical form", where)
+        raise FormatError("payload is not in canonical form", where, rule="CON-15")
     return values
 
 
@@ -103,8 +105,10 @@ def _by_key(fields: tuple[Field, ...], content: Any, where: str) -> dict[str, An
     if isinstance(content, dict) and list(content) == keys:
         return content
     if not isinstance(content, list):
-        raise FormatError(f"payload is neither an array nor a map of {', '.join(keys)}", where)
+        rule = "CON-17" if isinstance(content, dict) else "CON-14"
+        expected = ", ".join(keys)
+        raise FormatError(f"payload is neither an array nor a map of {expected}", where, rule=rule)
     if len(content) != len(keys):
         counts = f"{len(content)} values instead of {len(keys)}"
-        raise FormatError(f"payload has {counts}: {', '.join(keys)}", where)
+        raise FormatError(f"payload has {counts}: {', '.join(keys)}", where, rule="CON-14")
     return dict(zip(keys, content, strict=True))

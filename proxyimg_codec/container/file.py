@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -75,12 +75,31 @@ def parse(data: bytes, limits: Limits = DEFAULT_LIMITS) -> Container:
         UnsupportedError: It needs a newer reader.
         LimitError: It exceeds `limits`.
     """
-    chunks = read(data, limits)
+    return assemble(read(data, limits), limits)
+
+
+def assemble(
+    chunks: Sequence[Chunk], limits: Limits, values_of: Callable[[Chunk], Values] | None = None
+) -> Container:
+    """The container of all chunks of a file.
+
+    Args:
+        chunks: The last is TAIL.
+        limits: Bounds them all together.
+        values_of: Gives the values of a structured chunk; `values` by default.
+
+    Raises:
+        FormatError, UnsupportedError, LimitError: As `parse`.
+    """
+    values_of = values_of or values
     if chunks[0].type != head.TYPE:
         raise FormatError(
-            "the first chunk is not HEAD", f"chunk {chunks[0].type}", chunks[0].offset
+            "the first chunk is not HEAD",
+            f"chunk {chunks[0].type}",
+            chunks[0].offset,
+            rule="CON-11",
         )
-    header = _unpack(chunks[0])
+    header = values_of(chunks[0])
     parts: dict[str, list[Values]] = {t: [] for t in _STRUCTURE}
     blocks: dict[str, bytes] = {}
     single: dict[str, Values] = {}
@@ -94,29 +113,31 @@ def parse(data: bytes, limits: Limits = DEFAULT_LIMITS) -> Container:
         where = f"chunk {chunk.type}"
         if chunk.type in _STRUCTURE:
             if _STRUCTURE.index(chunk.type) < stage or blocks or single:
-                raise FormatError("out of order", where, chunk.offset)
+                raise FormatError("out of order", where, chunk.offset, rule="CON-11")
             stage = _STRUCTURE.index(chunk.type)
-            parts[chunk.type].append(_unpack(chunk))
+            parts[chunk.type].append(values_of(chunk))
         elif chunk.type in _BLOCK_NAMES:
             name = _BLOCK_NAMES[chunk.type]
             if name in blocks:
-                raise FormatError("appears twice", where, chunk.offset)
+                raise FormatError("appears twice", where, chunk.offset, rule="CON-11")
             blocks[name] = meta.decompress(chunk.payload, where, limits)
         elif chunk.type in _SINGLE:
             if chunk.type in single:
-                raise FormatError("appears twice", where, chunk.offset)
-            single[chunk.type] = _unpack(chunk)
+                raise FormatError("appears twice", where, chunk.offset, rule="CON-11")
+            single[chunk.type] = values_of(chunk)
             if chunk.type == undo.TYPE:
                 present = [c for c in chunks if c.type not in (undo.TYPE, "TAIL")]
                 history = _renewed(undo.decode(chunk.payload, present, where, limits))
         elif chunk.type in (head.TYPE, "TAIL"):
-            raise FormatError("appears twice", where, chunk.offset)
+            raise FormatError("appears twice", where, chunk.offset, rule="CON-11")
         elif chunk.critical:
-            raise UnsupportedError(f"{where} is not known to this program; update proxyimg-codec")
+            raise UnsupportedError(
+                f"{where} is not known to this program; update proxyimg-codec", rule="CON-9"
+            )
         else:
             extra.append(chunk)
     if chunks[-1].payload:
-        raise FormatError("must be empty", "chunk TAIL", chunks[-1].offset)
+        raise FormatError("must be empty", "chunk TAIL", chunks[-1].offset, rule="CON-11")
     container = Container(
         header, tuple(parts[layr.TYPE]), tuple(parts[netw.TYPE]), tuple(parts[texr.TYPE]),
         tuple(parts[plan.TYPE]), tuple(parts[mesh.TYPE]), tuple(parts[pose.TYPE]),
@@ -136,8 +157,15 @@ def fields_of(chunk: Chunk) -> tuple[Field, ...]:
     return texr.fields_of(chunk.payload) if chunk.type == texr.TYPE else _FIELDS.get(chunk.type, ())
 
 
-def _unpack(chunk: Chunk) -> Values:
-    return unpack(fields_of(chunk), chunk.payload, f"chunk {chunk.type} at byte {chunk.offset}")
+def values(chunk: Chunk) -> Values:
+    """The values of a structured chunk, each checked by itself.
+
+    Raises:
+        FormatError: They are not as declared.
+        UnsupportedError: A texture coder that is not known.
+    """
+    where = f"chunk {chunk.type}" + ("" if chunk.offset is None else f" at byte {chunk.offset}")
+    return unpack(fields_of(chunk), chunk.payload, where)
 
 
 def _renewed(steps: tuple[undo.Step, ...]) -> tuple[undo.Step, ...]:

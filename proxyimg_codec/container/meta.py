@@ -48,8 +48,12 @@ def decompress(payload: bytes, where: str, limits: Limits) -> bytes:
     return decompressed(values["size"], values["zstd"], where, limits)
 
 
-def decompressed(size: int, frame: bytes, where: str, limits: Limits) -> bytes:
+def decompressed(
+    size: int, frame: bytes, where: str, limits: Limits, rule: str = "CHK-16"
+) -> bytes:
     """The block of `size` bytes that `frame` holds, never larger than `limits.metadata_bytes`.
+
+    `rule` is the one that asks for it.
 
     Raises:
         FormatError: Not a zstd frame of that size.
@@ -60,27 +64,27 @@ def decompressed(size: int, frame: bytes, where: str, limits: Limits) -> bytes:
         decompressor = zstandard.ZstdDecompressor(max_window_size=WINDOW_MAX)
         block: bytes = decompressor.stream_reader(frame).read(size + 1)
     except zstandard.ZstdError:
-        raise FormatError("metadata is not a zstd frame", where) from None
+        raise FormatError("metadata is not a zstd frame", where, rule=rule) from None
     if len(block) != size:
-        raise FormatError(f"metadata does not have the stated {size} bytes", where)
-    if _frame_end(frame, where) != len(frame):
-        raise FormatError("bytes follow the zstd frame", where)
+        raise FormatError(f"metadata does not have the stated {size} bytes", where, rule=rule)
+    if _frame_end(frame, where, rule) != len(frame):
+        raise FormatError("bytes follow the zstd frame", where, rule=rule)
     return block
 
 
-def _frame_end(data: bytes, where: str) -> int:
+def _frame_end(data: bytes, where: str, rule: str) -> int:
     """Length of the zstd frame that `data` starts with (RFC 8878, section 3.1.1).
 
     Raises:
         FormatError: It starts with something else, or the frame is cut.
     """
     if data[:4] != b"\x28\xb5\x2f\xfd":
-        raise FormatError("metadata is not a zstd frame", where)
+        raise FormatError("metadata is not a zstd frame", where, rule=rule)
     at = int(zstandard.frame_header_size(data))
     last = False
     while not last:
         if at + 3 > len(data):
-            raise FormatError("the zstd frame is truncated", where)
+            raise FormatError("the zstd frame is truncated", where, rule=rule)
         header = int.from_bytes(data[at : at + 3], "little")
         last, kind, size = bool(header & 1), header >> 1 & 3, header >> 3
         at += 3 + (1 if kind == 1 else size)

@@ -68,7 +68,7 @@ def fields_of(payload: bytes) -> tuple[Field, ...]:
         elif first == b"\xcc" and second >= b"\x80":
             coder = int.from_bytes(second)
     if coder not in CODERS:
-        raise UnsupportedError(f"chunk TEXR: texture coder {coder} is not known")
+        raise UnsupportedError(f"chunk TEXR: texture coder {coder} is not known", rule="CHK-13")
     return CODERS[coder]
 
 

@@ -56,11 +56,14 @@ def encode(present: Sequence[Chunk], steps: Sequence[Step]) -> Chunk:
         number.setdefault((chunk.type, chunk.payload), i)
     kept: list[list[Any]] = []
     states: list[list[Any]] = []
-    size = 0
+    size = references = 0
     for step in reversed(steps[-STEPS_MAX:]):
         keys = [(chunk.type, chunk.payload) for chunk in step.chunks]
         fresh = [key for key in dict.fromkeys(keys) if key not in number]
         size += 4 * len(step.operation) + 6 * len(keys) + sum(len(p) + 16 for _, p in fresh) + 16
+        references += len(keys)
+        if references > DEFAULT_LIMITS.references:
+            break
         if size > SIZE_MAX or len(present) + len(kept) + len(fresh) > CHUNKS_MAX:
             break
         for key in fresh:
@@ -79,12 +82,12 @@ def decode(
 
     Raises:
         FormatError: The history is corrupt.
-        LimitError: It is larger than `limits.metadata_bytes`.
+        LimitError: It exceeds `limits`.
     """
     values = unpack(FIELDS, payload, where)
     if values["state"] != digest(present):
         return ()
-    history = meta.decompressed(values["size"], values["zstd"], where, limits)
+    history = meta.decompressed(values["size"], values["zstd"], where, limits, "CHK-20")
     try:
         content = msgpack.unpackb(
             history, raw=False, strict_map_key=True, max_ext_len=0, max_array_len=1 << 20
@@ -93,6 +96,7 @@ def decode(
         if list(content) != ["chunks", "steps"] or len(steps) > STEPS_MAX:
             raise ValueError
         limits.check("chunks", len(present) + len(kept))
+        limits.check("references", sum(len(references) for _, references in steps))
         pool = [*present, *(_chunk(type_, payload) for type_, payload in kept)]
         result = tuple(_step(operation, references, pool) for operation, references in steps)
         if msgpack.packb(content, use_bin_type=True) != history:
@@ -100,7 +104,9 @@ def decode(
     except (
         ValueError, TypeError, KeyError, IndexError, RecursionError, msgpack.UnpackException,
     ) as error:  # fmt: skip
-        raise FormatError(f"the history is corrupt ({type(error).__name__})", where) from None
+        raise FormatError(
+            f"the history is corrupt ({type(error).__name__})", where, rule="CHK-20"
+        ) from None
     return result
 
 

@@ -169,10 +169,12 @@ def unpack_bits(data: bytes, shape: tuple[int, ...], width: int) -> NDArray[np.u
     """
     count = int(np.prod(shape)) * width
     if len(data) != (count + 7) // 8:
-        raise FormatError(f"expected {(count + 7) // 8} bytes of raw bits, found {len(data)}")
+        raise FormatError(
+            f"expected {(count + 7) // 8} bytes of raw bits, found {len(data)}", rule="ENT-16"
+        )
     bits = np.unpackbits(np.frombuffer(data, np.uint8))
     if bits[count:].any():
-        raise FormatError("padding bits are not zero")
+        raise FormatError("padding bits are not zero", rule="ENT-16")
     weights = 1 << np.arange(width - 1, -1, -1)
     return (
         (bits[:count].reshape(int(np.prod(shape)), width) @ weights).astype(np.uint8).reshape(shape)

@@ -129,19 +129,19 @@ class Decoder:
 
     def __init__(self, data: bytes) -> None:
         if not data or data[0] > MAX_LANES_LOG2:
-            raise FormatError("entropy-coded stream is empty or has too many lanes")
+            raise FormatError("entropy-coded stream is empty or has too many lanes", rule="ENT-4")
         self.lanes, self.scale_bits = 1 << data[0], SCALE_BITS
         head = 1 + 4 * self.lanes + 4
         if len(data) < head:
-            raise FormatError("entropy-coded stream is truncated")
+            raise FormatError("entropy-coded stream is truncated", rule="ENT-4")
         self.states = np.frombuffer(data, "<u4", self.lanes, 1).astype(np.uint64)
         count = int.from_bytes(data[head - 4 : head], "little")
         if len(data) < head + 2 * count:
-            raise FormatError("entropy-coded stream is truncated")
+            raise FormatError("entropy-coded stream is truncated", rule="ENT-4")
         self.words = np.frombuffer(data, "<u2", count, head).astype(np.uint64)
         self.used = 0
         if (self.states < LOW).any():
-            raise FormatError("entropy-coded stream starts from an invalid state")
+            raise FormatError("entropy-coded stream starts from an invalid state", rule="ENT-4")
         self.end = head + 2 * count
 
     def check_capacity(self, symbols: int, alphabet: int) -> None:
@@ -154,7 +154,7 @@ class Decoder:
             FormatError: There are too few words.
         """
         if symbols * (alphabet - 1) > 16 * (len(self.words) + self.lanes) << SCALE_BITS:
-            raise FormatError("entropy-coded stream is too short for its array")
+            raise FormatError("entropy-coded stream is too short for its array", rule="ENT-6")
 
     def symbols(self, cdf: NDArray[np.int64]) -> NDArray[np.int64]:
         """The next N symbols, whose cumulative frequencies are the rows of `cdf` [N, A + 1].
@@ -223,7 +223,7 @@ class Decoder:
         low = (state < _LOW).nonzero()[0]
         stop = self.used + len(low)
         if stop > len(self.words):
-            raise FormatError(TOO_SHORT)
+            raise FormatError(TOO_SHORT, rule="ENT-6")
         state[low] = state[low] << _WORD_SHIFT | self.words[self.used : stop]
         self.used = stop
         self.states[:count] = state
@@ -235,4 +235,6 @@ class Decoder:
             FormatError: Words are left over or a state is not back at `LOW`.
         """
         if self.used != len(self.words) or (self.states != LOW).any():
-            raise FormatError("entropy-coded stream does not end where its symbols do")
+            raise FormatError(
+                "entropy-coded stream does not end where its symbols do", rule="ENT-7"
+            )

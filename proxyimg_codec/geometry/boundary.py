@@ -67,7 +67,7 @@ def decode(fields: Mapping[str, Any], where: str) -> Boundary | None:
     """
     if not fields["segments"]:
         if fields["classes"] or fields["deltas"] or fields["unit"]:
-            raise FormatError("a layer without segments has boundary data", where)
+            raise FormatError("a layer without segments has boundary data", where, rule="CHK-8")
         return None
     total = sum(fields["segments"])
     flat = deltas.decode(fields["classes"], fields["deltas"], 6, total, where).T
@@ -76,7 +76,7 @@ def decode(fields: Mapping[str, Any], where: str) -> Boundary | None:
     for part in np.split(flat, np.cumsum(fields["segments"])[:-1]):
         path = np.cumsum(part.reshape(-1, 2), axis=0) + origin
         if np.abs(path).max() >= COORDINATE_MAX:
-            raise FormatError("a control point is out of range", where)
+            raise FormatError("a control point is out of range", where, rule="GEO-6")
         paths.append(path)
         origin = path[0]
     return Boundary(fields["unit"], tuple(paths))

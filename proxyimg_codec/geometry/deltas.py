@@ -47,7 +47,7 @@ def decode(
     try:
         classes = arrays.decode(coded, (channels, rows, count), 4, stored).ravel().astype(np.int64)
     except FormatError as error:
-        raise FormatError(str(error), where) from None
+        raise FormatError(str(error), where, rule=error.rule) from None
     return _read(raw, classes, where).reshape(channels, rows * count)
 
 
@@ -57,10 +57,10 @@ def _read(data: bytes, classes: Ints, where: str) -> Ints:
     ends = np.cumsum(width)
     total = int(ends[-1])
     if len(data) != (total + 7) // 8:
-        raise FormatError("the raw bits of the deltas have the wrong length", where)
+        raise FormatError("the raw bits of the deltas have the wrong length", where, rule="ENT-19")
     bits = np.unpackbits(np.frombuffer(data, np.uint8)).astype(np.int64)
     if bits[total:].any():
-        raise FormatError("padding bits of the deltas are not zero", where)
+        raise FormatError("padding bits of the deltas are not zero", where, rule="ENT-19")
     out = np.zeros(len(classes), np.int64)
     for k in np.unique(classes[classes > 0]):
         at = np.flatnonzero(classes == k)
@@ -69,7 +69,9 @@ def _read(data: bytes, classes: Ints, where: str) -> Ints:
         weights = np.int64(1) << np.arange(n - 1, -1, -1, dtype=np.int64)
         value = bits[first[:, None] + np.arange(n)] @ weights
         if k == _ESCAPE and (value < 1 << (_ESCAPE - 1)).any():
-            raise FormatError("a delta is coded in a larger class than it needs", where)
+            raise FormatError(
+                "a delta is coded in a larger class than it needs", where, rule="ENT-20"
+            )
         value += 0 if k == _ESCAPE else 1 << n
         out[at] = np.where(bits[first - 1] == 1, -value, value)
     return out

@@ -140,13 +140,15 @@ class Mesh:
         for _ in range(self.fields["levels"]):
             end = at + 4 + int.from_bytes(data[at : at + 4], "little")
             if end > len(data) or count == 0:
-                raise FormatError("split flags are truncated", self._where)
+                raise FormatError("split flags are truncated", self._where, rule="MSH-11")
             self._limits.check("faces", 4 * count)
             values = arrays.decode(data[at + 4 : end], (1, 1, count), 1, np.ones((1, count), bool))
             flags.append(values[0, 0] > 0)
             count, at = 4 * int(flags[-1].sum()), end
         if at != len(data) or (flags and not flags[-1].any()):
-            raise FormatError("split flags do not end where they should", self._where)
+            raise FormatError(
+                "split flags do not end where they should", self._where, rule="MSH-11"
+            )
         return flags
 
     @cached_property
@@ -390,6 +392,9 @@ def _decode(fields: Mapping[str, Any], where: str) -> Base:
     border = _Border(count)
     triangles: list[tuple[int, int, int]] = []
 
+    def corrupt(rule: str) -> FormatError:
+        return FormatError("the connectivity of the mesh is corrupt", where, rule=rule)
+
     def get(symbol: int, expected: Point, ranked: Ints | None) -> int:
         if symbol == NEW:
             dx, dy = next(residuals)
@@ -399,14 +404,16 @@ def _decode(fields: Mapping[str, Any], where: str) -> Base:
         elif ranked is not None and 0 <= symbol - RANKED < len(ranked):
             vertex = int(ranked[symbol - RANKED])
         else:
-            raise IndexError
+            raise corrupt("MSH-5" if ranked is None else "MSH-8")
         if vertex >= border.known:
-            raise IndexError
+            raise corrupt("MSH-3")
         return vertex
 
     def place(a: int, b: int, c: int) -> None:
         if not border.place_triangle(a, b, c):
-            raise FormatError("a triangle of the mesh is not positive, or overlaps", where)
+            raise FormatError(
+                "a triangle of the mesh is not positive, or overlaps", where, rule="MSH-2"
+            )
         triangles.append((a, b, c))
 
     try:
@@ -422,10 +429,12 @@ def _decode(fields: Mapping[str, Any], where: str) -> Base:
                 if symbol != BORDER:
                     ranked = border.ranked((x, y), near) if symbol > NEW else None
                     place(y, x, get(symbol, border.predicted((x, y), near), ranked))
-    except (StopIteration, IndexError):
-        raise FormatError("the connectivity of the mesh is corrupt", where) from None
+    except StopIteration:
+        raise corrupt("MSH-9") from None
     if border.known != count or next(far, None) is not None:
-        raise FormatError("the connectivity of the mesh does not use all its vertices", where)
+        raise FormatError(
+            "the connectivity of the mesh does not use all its vertices", where, rule="MSH-9"
+        )
     return Base(
         (fields["origin"][0], fields["origin"][1]),
         (fields["step"][0], fields["step"][1]),

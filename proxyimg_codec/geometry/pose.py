@@ -210,32 +210,32 @@ def decode(fields: Mapping[str, Any], mesh: Mesh | None, where: str) -> Pose:
     """
     a, b, c, d = fields["matrix"]
     if a * d == b * c:
-        raise FormatError("the matrix is singular", where)
+        raise FormatError("the matrix is singular", where, rule="MSH-16")
     if len(fields["colour"]) not in (0, 12):
-        raise FormatError("the colour matrix does not have 12 entries", where)
+        raise FormatError("the colour matrix does not have 12 entries", where, rule="CHK-11")
     arrays: list[Ints | None] = []
     for name in ("node", "place"):
         coded, raw = fields[f"{name}_classes"], fields[f"{name}_deltas"]
         if not coded and raw:
-            raise FormatError("displacements have raw bits without classes", where)
+            raise FormatError("displacements have raw bits without classes", where, rule="MSH-17")
         if not coded:
             arrays.append(None)
             continue
         if mesh is None:
-            raise FormatError("displacements need a mesh", where)
+            raise FormatError("displacements need a mesh", where, rule="MSH-17")
         refined = mesh.refined
         values = restored(deltas.decode(coded, raw, 2, len(refined.nodes), where).T, refined)
         if np.abs(values).max() >= NODE_MAX:
-            raise FormatError("a displacement is out of range", where)
+            raise FormatError("a displacement is out of range", where, rule="MSH-19")
         if not values.any():
-            raise FormatError("displacements are all zero", where)
+            raise FormatError("displacements are all zero", where, rule="MSH-19")
         arrays.append(values)
     pose = Pose(
         (a, b, c, d), (fields["shift"][0], fields["shift"][1]), arrays[0], arrays[1],
         fields["opacity"], bool(fields["hidden"]), tuple(fields["colour"]),
     )  # fmt: skip
     if pose.at_rest:
-        raise FormatError("the pose does nothing", where)
+        raise FormatError("the pose does nothing", where, rule="CHK-11")
     return pose
 
 

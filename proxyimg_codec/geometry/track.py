@@ -198,6 +198,6 @@ def decode(
         shape = restored(flat, refined).reshape(-1, modes, 2).transpose(1, 0, 2)
         curve = np.cumsum(curve, axis=1)
         if np.abs(curve).max() >= CURVE_MAX or np.abs(shape).max() >= SHAPE_MAX:
-            raise FormatError("a curve or shape is out of range", where)
+            raise FormatError("a curve or shape is out of range", where, rule="MOT-5")
         tracks.append(Track(curve, shape))
     return tracks

@@ -171,11 +171,11 @@ def _run(at: Place, values: Ints | None, source: _Source, sink: _Sink) -> tuple[
     )  # fmt: skip
     wrong = lib.pxi_pyramid_level(ct.byref(level))
     if wrong == STREAM_ENDS:
-        raise FormatError(rans.TOO_SHORT)
+        raise FormatError(rans.TOO_SHORT, rule="ENT-6")
     if wrong == ESCAPES_END:
-        raise FormatError(context.BAD_ESCAPES)
+        raise FormatError(context.BAD_ESCAPES, rule="PYR-13")
     if wrong == OUT_OF_RANGE:
-        raise FormatError(context.BAD_LATENT)
+        raise FormatError(context.BAD_LATENT, rule="PYR-12")
     if wrong:
         raise MemoryError("not enough memory to code a pyramid")
     return level, latents

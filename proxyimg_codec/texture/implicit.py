@@ -165,12 +165,12 @@ def unpack(
     dim = networks[fields["network"]].shape.dim
     if sampling == 1:  # a local and a global feature
         dim //= 2
-    steps = read_halves(fields["steps"], dim, where, positive=True)
+    steps = read_halves(fields["steps"], dim, where, "TEX-3", positive=True)
     stored = np.ones((rows, columns), bool)
     if fields["stored"]:
         stored = arrays.decode(fields["stored"], (1, rows, columns), 1, stored)[0].astype(bool)
         if stored.all() or not stored.any():
-            raise FormatError("the mask of stored codes is full or empty", where)
+            raise FormatError("the mask of stored codes is full or empty", where, rule="TEX-1")
     values = arrays.decode(fields["codes"], (dim, rows, columns), fields["bits"], stored)
     codes = (values.astype(np.int16) - (1 << (fields["bits"] - 1))).astype(np.int8)
     texture = ImplicitTexture(

@@ -153,7 +153,7 @@ def registered(number: int) -> Model:
     """
     if number not in REGISTERED:
         raise UnsupportedError(f"chunk PLAN: pyramid model {number} is not known; update "
-                               "proxyimg-codec")  # fmt: skip
+                               "proxyimg-codec", rule="PYR-1")  # fmt: skip
     data = resources.files("proxyimg_codec.models").joinpath(f"pyramid-{number}.bin").read_bytes()
     if hashlib.sha256(data).hexdigest() != REGISTERED[number]:
         raise UnsupportedError(f"the weights of pyramid model {number} are damaged; reinstall")

@@ -167,13 +167,13 @@ def unpack(fields: Mapping[str, Any], where: str = "chunk NETW") -> Network:
         FormatError: Corrupt streams, wrong lengths, steps or biases that are not finite.
     """
     shape = NetShape(*(fields[k] for k in ("dim", "octaves", "hidden", "depth", "channels")))
-    steps = read_halves(fields["steps"], shape.rows, where, positive=True)
-    biases = read_halves(fields["biases"], shape.rows, where)
+    steps = read_halves(fields["steps"], shape.rows, where, "TEX-16", positive=True)
+    biases = read_halves(fields["biases"], shape.rows, where, "TEX-16")
     data, at, weights = fields["weights"], 0, []
     for inputs, outputs in shape.layers:
         end = at + 4 + int.from_bytes(data[at : at + 4], "little")
         if end > len(data):
-            raise FormatError("weights are truncated", where)
+            raise FormatError("weights are truncated", where, rule="TEX-15")
         values = arrays.decode(
             data[at + 4 : end],
             (1, outputs, inputs),
@@ -183,21 +183,25 @@ def unpack(fields: Mapping[str, Any], where: str = "chunk NETW") -> Network:
         weights.append((values.astype(np.int16) - (1 << (fields["bits"] - 1))).astype(np.int8))
         at = end
     if at != len(data):
-        raise FormatError("bytes follow the weights", where)
+        raise FormatError("bytes follow the weights", where, rule="TEX-15")
     network = Network(shape, fields["bits"], tuple(weights), steps, biases)
     network.__dict__["packed"] = fields
     return network
 
 
-def read_halves(data: bytes, count: int, where: str, positive: bool = False) -> NDArray[np.float16]:
-    """`count` finite float16 values.
+def read_halves(
+    data: bytes, count: int, where: str, rule: str, positive: bool = False
+) -> NDArray[np.float16]:
+    """`count` finite float16 values, as `rule` asks for.
 
     Raises:
         FormatError: Wrong length, a value that is not finite, or not positive where it must be.
     """
     if len(data) != 2 * count:
-        raise FormatError(f"expected {count} float16 values, found {len(data)} bytes", where)
+        raise FormatError(
+            f"expected {count} float16 values, found {len(data)} bytes", where, rule=rule
+        )
     values = np.frombuffer(data, "<f2").astype(np.float16)
     if not np.isfinite(values).all() or (positive and (values <= 0).any()):
-        raise FormatError("a float16 value is not finite or not positive", where)
+        raise FormatError("a float16 value is not finite or not positive", where, rule=rule)
     return values

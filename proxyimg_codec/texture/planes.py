@@ -68,7 +68,7 @@ class Planes:
         if self.packed["support"]:
             stored = arrays.decode(self.packed["support"], (1, *shape), 1, stored)[0].astype(bool)
             if stored.all() or not stored.any():
-                raise FormatError("the support is full or empty", self.where)
+                raise FormatError("the support is full or empty", self.where, rule="PYR-5")
         return stored
 
     @property
@@ -112,11 +112,11 @@ def unpack(fields: Mapping[str, Any], where: str = "chunk PLAN") -> Planes:
     model.registered(fields["model"])
     levels, components = fields["levels"], fields["components"]
     if components == 2:
-        raise FormatError("2 components: they are 1 or 3", where)
+        raise FormatError("2 components: they are 1 or 3", where, rule="PYR-2")
     if fields["grey"] > levels or (components == 1 and fields["grey"] < levels):
-        raise FormatError("more levels without chroma than there are levels", where)
+        raise FormatError("more levels without chroma than there are levels", where, rule="PYR-2")
     if len(fields["lowest"]) != components or len(fields["shifts"]) != 2 * levels:
-        raise FormatError("scales or shifts do not fit the levels", where)
+        raise FormatError("scales or shifts do not fit the levels", where, rule="PYR-2")
     return Planes(fields, where)
 
 
@@ -195,7 +195,9 @@ def salvaged(planes: Planes) -> tuple[Planes, int]:
         coder.finish(where)
     except FormatError as error:
         if not found:
-            raise FormatError(f"none of the planes can be decoded: {error}", where) from None
+            raise FormatError(
+                f"none of the planes can be decoded: {error}", where, rule=error.rule
+            ) from None
     else:
         return planes, packed["levels"]
     del found[packed["levels"] :]
@@ -339,7 +341,7 @@ class _Decoder:
         off <<= shift
         off[deep] += low
         if (np.abs(off) >= context.LIMIT).any():
-            raise FormatError(context.BAD_LATENT)
+            raise FormatError(context.BAD_LATENT, rule="PYR-12")
         out[there] = off
         return out
 
@@ -352,7 +354,7 @@ class _Decoder:
         n = shift = 0
         while True:
             if self._at >= len(self._escapes) or shift > 21:
-                raise FormatError(context.BAD_ESCAPES)
+                raise FormatError(context.BAD_ESCAPES, rule="PYR-13")
             byte = self._escapes[self._at]
             self._at += 1
             n |= (byte & 127) << shift
@@ -367,8 +369,11 @@ class _Decoder:
             FormatError: Something is left over.
         """
         self._stream.finish()
-        if self._at != len(self._escapes) or self._stream.end != len(self._data):
-            raise FormatError("bytes are left over after the latents", where)
+        for at, data, rule in (
+            (self._at, self._escapes, "PYR-13"), (self._stream.end, self._data, "PYR-8"),
+        ):  # fmt: skip
+            if at != len(data):
+                raise FormatError("bytes are left over after the latents", where, rule=rule)
 
 
 def _code(

@@ -277,7 +277,7 @@ def unpack(
         shape = texr.mask_shape(fields)
         mask = arrays.decode(fields["mask"], (1, *shape), 1, np.ones(shape, bool))[0].astype(bool)
         if mask.all() or not mask.any():
-            raise FormatError("the mask of the view is full or empty", where)
+            raise FormatError("the mask of the view is full or empty", where, rule="PYR-39")
     alpha = planes[fields["alpha"] - 1] if fields["alpha"] else None
     texture = PyramidTexture(
         planes[fields["planes"]], alpha, (x, y, width, height), fields["cell"], mask, cuts

@@ -154,3 +154,12 @@ def test_a_damaged_frame_is_refused():
     values = {"state": undo.digest(PRESENT), "size": 9, "zstd": b"rubbish"}
     with pytest.raises(FormatError, match="zstd"):
         decode(Chunk("uNDO", pack(undo.FIELDS, values)))
+
+
+def test_references_are_limited():
+    # A few bytes can refer to the same chunks again and again.
+    history = [Step("{}", tuple(PRESENT) * 5) for _ in range(3)]
+    chunk = undo.encode(PRESENT, history)
+    assert len(decode(chunk, limits=Limits(references=60))) == 3
+    with pytest.raises(LimitError, match="references: 60 exceeds the limit of 59"):
+        decode(chunk, limits=Limits(references=59))

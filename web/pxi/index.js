@@ -1,0 +1,7 @@
+/** A decoder of .pxi files. */
+
+export { PxiError } from "./errors.js";
+export { Image } from "./image.js";
+export { LIMITS } from "./limits.js";
+export { MODEL_FILES } from "./model.js";
+export { render } from "./render.js";

@@ -1,0 +1,441 @@
+/** Chapter 11 up to PYR-28: from the stream of a PLAN to its latents. All of it is exact. */
+
+import { Rans, decodeMask } from "./entropy.js";
+import { need } from "./errors.js";
+import { clamp } from "./integers.js";
+import { Rows, conv3, mirrored, rough } from "./planes.js";
+import { DECAY, REACHES } from "./scales.js";
+
+const STEP_ORIGIN = 293;
+const SHIFT_ORIGIN = 8;
+const LIMIT = 65536;
+const CERTAIN = 4;
+const DIRECT = 40;
+
+/** P(k, n) of PYR-11, for n below 16 * 33. */
+const powers = memo((k) => {
+  const values = new Float64Array(16 * 33);
+  let value = 1n << 30n;
+  for (let n = 0; n < values.length; n++) {
+    values[n] = Number(value);
+    value = (value * BigInt(DECAY[k]) + (1n << 29n)) >> 30n;
+  }
+  return values;
+});
+
+/** Cumulative frequencies of the distribution of (s', p) = (key >> 4, key & 15) (PYR-11). */
+const distribution = memo((key) => {
+  const [scale, part] = [key >> 4, key & 15];
+  const reach = REACHES[scale];
+  const below = (i) => {
+    const z = 16 * (i - reach) - part;
+    const tail = 7 * powers(scale)[Math.abs(z)] + powers(scale + 8)[Math.abs(z)];
+    return z < 0 ? tail : 2 ** 34 - tail;
+  };
+  const starts = Uint16Array.from({ length: 2 * reach + 3 }, (_, i) => {
+    return Math.floor(((below(i) - below(0)) * (2 ** 14 - 2 * reach - 2)) / 2 ** 34) + i;
+  });
+  starts[2 * reach + 2] = 2 ** 14;
+  return starts;
+});
+
+function memo(make) {
+  const made = [];
+  return (key) => (made[key] ??= make(key));
+}
+
+/** The latents of one stream, set by set (PYR-8 to PYR-13). */
+class Coder {
+  /** `most` is the number of latents of the largest set. */
+  constructor({ data, escapes }, most) {
+    this.rans = new Rans(data);
+    this.data = data;
+    this.escapes = escapes;
+    this.escaped = 0;
+    this.low = new Uint16Array(most);
+  }
+
+  /** Puts `count` latents into `out`; `means` and `scales` are what is expected of them. */
+  set(means, scales, out, count) {
+    const { rans, low } = this;
+    const lanes = rans.lanes - 1;
+    let coded = 0;
+    let raw = 0;
+    for (let i = 0; i < count; i++) {
+      let scale = scales[i];
+      let mean = means[i];
+      if (scale <= CERTAIN && mean >= -4 && mean <= 4) {
+        out[i] = 0;
+        continue;
+      }
+      const shift = rawBits(scale);
+      if (shift) {
+        raw++;
+        scale -= (11 * shift + 1) >> 1;
+        mean = (mean >> shift) - 8 + (8 >> shift);
+      }
+      const centre = (mean + 8) >> 4;
+      const reach = REACHES[scale];
+      const starts = distribution((scale << 4) | (mean + 8 - 16 * centre));
+      const symbol = rans.symbol(coded++ & lanes, starts, 0, 2 * reach + 2);
+      // Escapes come after raw bits, so they are marked for now.
+      out[i] = symbol > 2 * reach ? ESCAPE - centre : centre + symbol - reach;
+    }
+    let lane = 0;
+    for (let i = 0; i < count; i++) {
+      const shift = raw ? rawBits(scales[i]) : 0;
+      low[i] = shift ? rans.raw(lane++ & lanes, shift) : 0;
+    }
+    for (let i = 0; i < count; i++) {
+      if (out[i] < ESCAPE / 2) out[i] = ESCAPE - out[i] + this.#escape();
+      const shift = raw ? rawBits(scales[i]) : 0;
+      const value = out[i] * 2 ** shift + low[i];
+      need(Math.abs(value) < LIMIT, "a latent is out of range");
+      out[i] = value;
+    }
+  }
+
+  /** PYR-13. */
+  #escape() {
+    let value = 0;
+    for (let shift = 0; shift < 28; shift += 7) {
+      need(this.escaped < this.escapes.length, "escapes end early");
+      const byte = this.escapes[this.escaped++];
+      value |= (byte & 127) << shift;
+      if (byte < 128) return value & 1 ? -((value + 1) >> 1) : value >> 1;
+    }
+    need(false, "an escape has more than four bytes");
+  }
+
+  finish() {
+    this.rans.finish();
+    need(this.rans.end === this.data.length, "there are bytes after the latents");
+    need(this.escaped === this.escapes.length, "escapes are left over");
+  }
+}
+const ESCAPE = -(2 ** 30);
+
+/** PYR-10. */
+const RAW_BITS = Uint8Array.from({ length: 64 }, (_, scale) => {
+  let bits = 0;
+  while (scale - ((11 * bits + 1) >> 1) > DIRECT) bits++;
+  return bits;
+});
+const rawBits = (scale) => RAW_BITS[scale];
+
+/** S(x, u) of PYR-18. */
+function squashed(x, unit) {
+  const v = Math.min(Math.abs(x), 508 * unit);
+  const under = 4 * unit + v;
+  const value = Math.floor((128 * v + Math.floor(under / 2)) / under);
+  return x < 0 ? -value : value;
+}
+
+/** G(x) of PYR-18 by |x|, and S(x, 1) by |x|. */
+const LOGS = Int32Array.from({ length: 53 }, (_, x) => Math.round(32 * Math.log(1 + x)));
+const SQUASHED = Int32Array.from({ length: 509 }, (_, x) => squashed(x, 1));
+const logOf = (x) => LOGS[Math.min(Math.abs(x), 52)];
+const squash = (x) => (x < 0 ? -SQUASHED[Math.min(-x, 508)] : SQUASHED[Math.min(x, 508)]);
+
+/** round(x, bits) as of the beginning of chapter 11, as a function of x. */
+function rounding(bits) {
+  if (bits <= 0) return (x) => x * 2 ** -bits;
+  const half = 1 << (bits - 1);
+  return (x) => (x + half) >> bits;
+}
+
+/** The lowest planes [3][rows * columns] (PYR-14). */
+function decodeLowest(coder, scales, rows, columns) {
+  const planes = [0, 1, 2].map(() => new Int32Array(rows * columns));
+  const count = scales.length;
+  const most = count * Math.min(rows, columns);
+  const [means, wanted, found] = [new Int32Array(most), new Uint8Array(most), new Int32Array(most)];
+  for (let t = 0; t < rows + columns - 1; t++) {
+    const first = Math.max(0, t - columns + 1);
+    const last = Math.min(rows - 1, t);
+    let i = 0;
+    for (let y = first; y <= last; y++) {
+      const x = t - y;
+      const at = y * columns + x;
+      for (let c = 0; c < count; c++, i++) {
+        const up = y ? planes[c][at - columns] : x ? planes[c][at - 1] : 0;
+        const left = x ? planes[c][at - 1] : up;
+        means[i] = 8 * (up + left);
+        wanted[i] = scales[c];
+      }
+    }
+    coder.set(means, wanted, found, i);
+    i = 0;
+    for (let y = first; y <= last; y++) {
+      for (let c = 0; c < count; c++) planes[c][y * columns + t - y] = found[i++];
+    }
+  }
+  return planes;
+}
+
+const LOW_TAPS = [[0, -10, 202, -10, 0], [0, -17, 107, 107, -17]];
+const HIGH_TAPS = [[6, -97, -97, 6, 0], [10, -28, 218, -28, 10]];
+
+/** J of PYR-16 for one line of n values, with strides of the inputs and the output. */
+function join(low, high, at, n, step, scale, out, to, stride) {
+  const line = (values, isHigh, factor) =>
+    Int32Array.from({ length: n + 4 }, (_, i) => factor * values[at + mirrored(i - 2, n, isHigh) * step]);
+  const a = line(low, 0, 1);
+  const b = line(high, 1, scale);
+  for (let i = 0; i < n; i++) {
+    for (const phase of [0, 1]) {
+      const [l, h] = [LOW_TAPS[phase], HIGH_TAPS[phase]];
+      let sum = 128;
+      for (let k = 0; k < 5; k++) sum += l[k] * a[i + k] + h[k] * b[i + k];
+      out[to + (2 * i + phase) * stride] = sum >> 8;
+    }
+  }
+}
+
+/** The plain plane of the next finer level from that of a level and its three bands (PYR-15). */
+function nextPlain(plain, bands, rows, columns) {
+  const sixteenfold = bands[0].map((v) => 16 * v);
+  const left = new Int32Array(2 * rows * columns);
+  const right = new Int32Array(left.length);
+  for (let x = 0; x < columns; x++) {
+    join(plain, bands[1], x, rows, columns, 16, left, x, columns);
+    join(sixteenfold, bands[2], x, rows, columns, 16, right, x, columns);
+  }
+  const out = new Int32Array(4 * rows * columns);
+  for (let y = 0; y < 2 * rows; y++) {
+    join(left, right, y * columns, columns, 1, 1, out, 2 * y * columns, 1);
+  }
+  return out.map((v) => clamp(v, -(2 ** 20), 2 ** 20));
+}
+
+/** Which positions of a level have latents (PYR-5, PYR-6): a byte for each, or null for all. */
+function supportOf({ cell, size: [w, h] }, cells, level, rows, columns) {
+  const wide = Math.ceil(w / 2 ** cell);
+  const side = 2 ** level;
+  const reach = (from, size) => [
+    Math.floor(from / 2 ** cell), Math.floor((Math.min(from + side, size) - 1) / 2 ** cell)];
+  const support = new Uint8Array(rows * columns);
+  for (let y = 0; y * side < h; y++) {
+    const [top, bottom] = reach(y * side, h);
+    for (let x = 0; x * side < w; x++) {
+      const [left, right] = reach(x * side, w);
+      let any = cells ? 0 : 1;
+      for (let j = top; j <= bottom && !any; j++) {
+        for (let i = left; i <= right; i++) any |= cells[j * wide + i];
+      }
+      support[y * columns + x] = any;
+    }
+  }
+  return support;
+}
+
+/** One level: its context networks, and the waves in which it is coded (PYR-18 to PYR-28). */
+class Level {
+  constructor(net, { step }, rows, columns, support) {
+    Object.assign(this, { net, rows, columns, support });
+    this.width = net.width;
+    this.latents = Array.from({ length: 9 }, () => new Int32Array(rows * columns));
+    this.some = new Uint8Array(rows * columns); // whether a position has a latent that is not 0
+    this.bias = net.first_bias.map((b, i) => {
+      return b + Math.floor((net.first_by_step[i] * (step - STEP_ORIGIN) + 128) / 256);
+    });
+    this.round = {};
+    for (const [name, bits] of Object.entries({
+      first: 0, second: 3, causal: 3, mix: 0, from_luma: 3,
+      luma_mean: -1, luma_scale: -2, chroma_mean: -1, chroma_scale: -2,
+    })) {
+      this.round[name] = rounding(-net.exponents[name.replace(/_(mean|scale)$/, "")] - bits);
+    }
+    this.sums = new Float64Array(this.width);
+    this.total = new Float64Array(this.width);
+    this.#arrange();
+  }
+
+  /** Weights of `causal` as [position][latent][S, G][output], and of `mix` as [input][output]. */
+  #arrange() {
+    const { width, net } = this;
+    this.mix = net.mix.map((_, i) => net.mix[(i % width) * width + Math.floor(i / width)]);
+    this.causal = new Float64Array(12 * 18 * width);
+    for (let o = 0; o < width; o++) {
+      for (let f = 0; f < 18; f++) {
+        for (let p = 0; p < 12; p++) {
+          const at = ((p * 9 + (f % 9)) * 2 + (f < 9 ? 0 : 1)) * width + o;
+          this.causal[at] = net.causal[(o * 18 + f) * 12 + p];
+        }
+      }
+    }
+  }
+
+  /** The results of the second layer [rows, columns, width] (PYR-20 to PYR-22). */
+  ahead(plain, parent) {
+    const { rows, columns, width, net, support } = this;
+    const wide = columns + 2;
+    const inputs = new Rows(rows, 12 * wide, (y, row) => {
+      for (let c = 0; c < 3; c++) {
+        rough(plain[c], rows, columns, y, (x, v) => (row[c * wide + x + 1] = squashed(v, 144)));
+      }
+      if (!parent) return;
+      for (let c = 0; c < 9; c++) {
+        const from = (y >> 1) * (columns >> 1);
+        const to = (3 + c) * wide + 1;
+        for (let x = 0; x < columns; x++) row[to + x] = logOf(parent[c][from + (x >> 1)]);
+      }
+    });
+    const first = new Rows(rows, width * wide, (y, row) => {
+      conv3(inputs.around(y), 12, columns, net.first, this.bias, width, row, 1, wide);
+      for (let o = 0; o < width; o++) {
+        for (let x = o * wide + 1; x <= o * wide + columns; x++) {
+          row[x] = clamp(this.round.first(row[x]), 0, 255);
+        }
+      }
+    });
+    const out = new Int16Array(rows * columns * width);
+    const sums = new Float64Array(width * columns);
+    for (let y = 0; y < rows; y++) {
+      if (!support.subarray(y * columns, (y + 1) * columns).includes(1)) continue;
+      conv3(first.around(y), width, columns, net.second, net.second_bias, width, sums, 0, columns);
+      for (let o = 0; o < width; o++) {
+        let to = y * columns * width + o;
+        for (let x = o * columns; x < (o + 1) * columns; x++, to += width) {
+          out[to] = clamp(this.round.second(sums[x]), -32768, 32767);
+        }
+      }
+    }
+    return out;
+  }
+
+  /** Decodes the latents. */
+  decode(coder, ahead, shifts, grey) {
+    const { rows, columns, support, width } = this;
+    const most = Math.min(rows, Math.ceil(columns / 3));
+    const hidden = new Int32Array(most * width);
+    const places = new Uint32Array(most);
+    const means = new Int32Array(6 * most);
+    const scales = new Uint8Array(6 * most);
+    const found = new Int32Array(6 * most);
+    for (let t = 0; t < columns + 3 * rows - 3; t++) {
+      let count = 0;
+      const last = Math.min(rows - 1, Math.floor(t / 3));
+      for (let y = Math.max(0, Math.ceil((t - columns + 1) / 3)); y <= last; y++) {
+        const at = y * columns + t - 3 * y;
+        if (support[at]) places[count++] = at;
+      }
+      if (!count) continue;
+      for (let i = 0; i < count; i++) {
+        this.#hidden(places[i], ahead, hidden, i * width);
+        this.#expect("luma", hidden, i * width, shifts[0], means, scales, 3 * i, 3);
+      }
+      coder.set(means, scales, found, 3 * count);
+      this.#store(places, count, found, 0, 3);
+      if (grey) continue;
+      for (let i = 0; i < count; i++) {
+        this.#withLuma(places[i], hidden, i * width);
+        this.#expect("chroma", hidden, i * width, shifts[1], means, scales, 6 * i, 6);
+      }
+      coder.set(means, scales, found, 6 * count);
+      this.#store(places, count, found, 3, 6);
+    }
+  }
+
+  #store(places, count, found, first, channels) {
+    for (let i = 0, k = 0; i < count; i++) {
+      for (let c = 0; c < channels; c++, k++) {
+        if (!found[k]) continue;
+        this.latents[first + c][places[i]] = found[k];
+        this.some[places[i]] = 1;
+      }
+    }
+  }
+
+  /** Hidden values of a position into out[to ..] (PYR-23, PYR-24). */
+  #hidden(at, ahead, out, to) {
+    const { width, columns, latents, some, sums, total } = this;
+    sums.fill(0);
+    const y = Math.floor(at / columns);
+    const x = at - y * columns;
+    for (let p = 0; p < 12; p++) {
+      const near = x + BEFORE_X[p];
+      const place = at + BEFORE_Y[p] * columns + BEFORE_X[p];
+      if (y + BEFORE_Y[p] < 0 || near < 0 || near >= columns || !some[place]) continue;
+      for (let c = 0; c < 9; c++) {
+        const value = latents[c][place];
+        if (value) this.#addCausal((p * 9 + c) * 2 * width, squash(value), logOf(value));
+      }
+    }
+    total.set(this.net.mix_bias);
+    for (let i = 0; i < width; i++) {
+      const z = (ahead[at * width + i] + this.round.causal(sums[i]) + 4) >> 3;
+      if (z > 0) this.#addMix(i * width, z > 255 ? 255 : z);
+    }
+    for (let o = 0; o < width; o++) out[to + o] = clamp(this.round.mix(total[o]), 0, 255);
+  }
+
+  #addCausal(w, s, g) {
+    const { width, causal, sums } = this;
+    for (let o = 0; o < width; o++) sums[o] += s * causal[w + o] + g * causal[w + width + o];
+  }
+
+  #addMix(w, z) {
+    const { width, mix, total } = this;
+    for (let o = 0; o < width; o++) total[o] += z * mix[w + o];
+  }
+
+  /** Means and scales of `count` latents (PYR-25). */
+  #expect(name, hidden, at, shift, means, scales, to, count) {
+    const { width, net } = this;
+    const weights = net[name];
+    const bias = net[`${name}_bias`];
+    const [ofMean, ofScale] = [this.round[`${name}_mean`], this.round[`${name}_scale`]];
+    for (let k = 0; k < 2 * count; k++) {
+      let total = bias[k];
+      for (let i = 0; i < width; i++) total += weights[k * width + i] * hidden[at + i];
+      if (k < count) means[to + k] = clamp(ofMean(total), -16384, 16384);
+      else scales[to + k - count] = clamp(ofScale(total) + 32 + shift, 0, 63);
+    }
+  }
+
+  /** What chroma sees, in place of the hidden values (PYR-26). */
+  #withLuma(at, hidden, to) {
+    const { width, net, latents } = this;
+    const y = [latents[0][at], latents[1][at], latents[2][at]];
+    const inputs = [...y.map(squash), ...y.map(logOf)];
+    for (let o = 0; o < width; o++) {
+      let total = net.from_luma_bias[o];
+      for (let i = 0; i < 6; i++) total += net.from_luma[o * 6 + i] * inputs[i];
+      hidden[to + o] = clamp((8 * hidden[to + o] + this.round.from_luma(total) + 4) >> 3, 0, 255);
+    }
+  }
+}
+const BEFORE = [-2, -1, 0].flatMap((j) => [-2, -1, 0, 1, 2].map((i) => [j, i])).slice(0, 12);
+const BEFORE_Y = Int32Array.from(BEFORE, ([j]) => j);
+const BEFORE_X = Int32Array.from(BEFORE, ([, i]) => i);
+
+/** Latents of a PLAN: `lowest` [3][positions], and `levels` 1, 2, .. {rows, columns, latents}. */
+export function decodeLatents(plan, model) {
+  const [w, h] = plan.size;
+  const count = plan.levels;
+  const cells = plan.support.length
+    ? decodeMask(plan.support, Math.ceil(h / 2 ** plan.cell), Math.ceil(w / 2 ** plan.cell))
+    : null;
+  let [rows, columns] = [Math.ceil(h / 2 ** count), Math.ceil(w / 2 ** count)];
+  const coder = new Coder(plan, 6 * Math.min(rows, columns) * 2 ** count);
+  const lowest = decodeLowest(coder, plan.lowest, rows, columns);
+  let plain = lowest.map((plane) => plane.map((v) => 16 * v));
+  let parent = null;
+  const levels = [];
+  for (let l = count; l >= 1; l--) {
+    const support = supportOf(plan, cells, l, rows, columns);
+    const level = new Level(model.of(l).context, plan, rows, columns, support);
+    const shifts = plan.shifts.slice(2 * l - 2, 2 * l).map((v) => v - SHIFT_ORIGIN);
+    level.decode(coder, level.ahead(plain, parent), shifts, l <= plan.grey);
+    const { latents } = level;
+    levels.unshift({ rows, columns, latents });
+    if (l > 1) {
+      plain = plain.map((p, c) => nextPlain(p, latents.slice(3 * c, 3 * c + 3), rows, columns));
+    }
+    parent = latents;
+    [rows, columns] = [2 * rows, 2 * columns];
+  }
+  coder.finish();
+  return { lowest, levels };
+}

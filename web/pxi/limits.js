@@ -1,0 +1,23 @@
+/** Default limits (SEC-2). `work` bounds steps of rendering that no other limit does (SEC-11). */
+export const LIMITS = Object.freeze({
+  file_bytes: 2 ** 30,
+  chunks: 2 ** 16,
+  side: 2 ** 20,
+  layers: 2 ** 10,
+  networks: 2 ** 6,
+  segments: 2 ** 16,
+  gates: 2 ** 16,
+  faces: 2 ** 18,
+  overlap: 64,
+  beyond: 2 ** 28,
+  codes: 2 ** 25,
+  samples: 2 ** 26,
+  filled: 2 ** 27,
+  covered: 2 ** 31,
+  wavefronts: 2 ** 16,
+  motion: 2 ** 22,
+  parameters: 2 ** 22,
+  metadata_bytes: 2 ** 26,
+  output_pixels: 2 ** 28,
+  work: 2 ** 30,
+});

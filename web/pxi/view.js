@@ -1,0 +1,180 @@
+/** Chapter 11, "Views": the part of a raster that a layer shows, and what of it may be seen. */
+
+import { REST } from "./chunks.js";
+import { decodeMask } from "./entropy.js";
+import { FULL, Work, coverage, scalePaths } from "./geometry.js";
+import { Diffusion } from "./implicit.js";
+import { clamp } from "./integers.js";
+
+const FILL_ONE = 65280;
+
+/** Whether two layers rest on each other (PYR-46, MOT-9). */
+function rest({ poses, bodies }, a, b) {
+  const [one, other] = [a, b].map((i) => poses.get(i) ?? REST);
+  const plain = (p) =>
+    !p.node_classes.length && !p.place_classes.length && !p.hidden && p.opacity === 65535;
+  const same = (key) => one[key].every((v, i) => v === other[key][i]);
+  return plain(one) && plain(other) && same("matrix") && same("shift") &&
+    bodies.get(a) === bodies.get(b);
+}
+
+/** Marks what is not within two samples of a spoilt one, in both directions. */
+function far(spoilt, w, h) {
+  const spread = (from, count, step, lines, stride) => {
+    const to = new Uint8Array(from.length);
+    for (let line = 0; line < lines; line++) {
+      for (let i = 0, at = line * stride; i < count; i++, at += step) {
+        if (!from[at]) continue;
+        const [first, last] = [Math.max(-2, -i), Math.min(2, count - 1 - i)];
+        for (let k = first; k <= last; k++) to[at + k * step] = 1;
+      }
+    }
+    return to;
+  };
+  return spread(spread(spoilt, w, 1, h, w), h, w, w, 1).map((v) => 1 - v);
+}
+
+/**
+ * Which samples of the part that layer n shows show, and which are trusted (PYR-39 to PYR-41 and
+ * PYR-46): two masks, or nulls if all do.
+ *
+ * `scene` has layers, textures, poses, boundaries and bodies, `k` is the number of the TEXR.
+ */
+function masksOf(scene, n, k) {
+  const { layers, textures, limits } = scene;
+  const { part, mask, cell, cuts } = textures[k];
+  const [, , w, h] = part;
+  if (mask.length) {
+    const wide = Math.ceil(w / 2 ** cell);
+    const bits = decodeMask(mask, Math.ceil(h / 2 ** cell), wide);
+    const shown = new Uint8Array(w * h);
+    for (let y = 0, i = 0; y < h; y++) {
+      for (let x = 0; x < w; x++, i++) shown[i] = bits[(y >> cell) * wide + (x >> cell)];
+    }
+    return { shown, trusted: shown };
+  }
+  if (!cuts.length) return { shown: null, trusted: null };
+  const covered = (c) => {
+    if (!layers[c].segments.length) return null;
+    const [left, top] = layers[k].box;
+    const paths = scalePaths(scene.boundaries[c], layers[c].unit, [0, 0, 1, 1], 1, 1).map((path) =>
+      path.map((p, i) => p - 256 * (i & 1 ? top : left)));
+    return coverage(paths, w, 0, h, new Work(limits));
+  };
+  const behind = cuts[0] === k ? bareBehind(scene, n, k, covered, w * h) : null;
+  const some = new Uint8Array(w * h);
+  const bare = new Uint8Array(w * h);
+  const shown = new Uint8Array(w * h).fill(1);
+  for (const c of cuts) {
+    const cover = covered(c);
+    const all = c > k && !rest(scene, n, c);
+    for (let i = 0; i < w * h; i++) {
+      const taken = c > k ? cover[i] : FULL - cover[i];
+      if (!taken) continue;
+      some[i] = 1;
+      if (taken === FULL) shown[i] = 0;
+      if (c > k ? all : behind[i]) bare[i] = 1;
+    }
+  }
+  if (!shown.includes(1)) shown.fill(1);
+  let trusted = far(some, w, h);
+  if (!trusted.includes(1)) trusted = shown;
+  const clear = far(bare, w, h).map((v, i) => v & shown[i]);
+  return { shown: clear.includes(1) ? clear : shown, trusted };
+}
+
+/** The samples that are bare to layer k itself (PYR-46, second case). */
+function bareBehind(scene, n, k, covered, size) {
+  const { textures } = scene;
+  const found = new Uint8Array(size);
+  const hidden = new Uint8Array(size);
+  for (let b = k - 1; b >= 0; b--) {
+    const below = textures[textures[b].coder === 0 ? textures[b].texture : b];
+    if (below.coder !== 2 || below.planes !== textures[k].planes) continue;
+    const rests = rest(scene, n, b);
+    const cover = covered(b);
+    for (let i = 0; i < size; i++) {
+      const value = cover ? cover[i] : FULL;
+      if (rests && value === FULL) hidden[i] = 1;
+      else if (!rests && value > 0 && !hidden[i]) found[i] = 1;
+    }
+  }
+  return found;
+}
+
+/**
+ * The samples that layer n shows, premultiplied [h, w, 3 or 4] (PYR-42, PYR-44).
+ *
+ * `rasters(number)` gives the samples of a PLAN.
+ */
+export function viewOf(scene, n, k, rasters) {
+  const { planes, alpha, part } = scene.textures[k];
+  const [x0, y0, w, h] = part;
+  const { shown, trusted } = masksOf(scene, n, k);
+  const diffusion = shown && new Diffusion(trusted, h, w);
+  const component = ({ columns, planes: found }, c) => {
+    const from = found[Math.min(c, found.length - 1)];
+    const out = new Float32Array(w * h);
+    for (let y = 0; y < h; y++) {
+      const at = (y0 + y) * columns + x0;
+      out.set(from.subarray(at, at + w), y * w);
+    }
+    return shown ? filled(out, shown, trusted, diffusion) : out;
+  };
+  const raster = rasters(planes);
+  const colours = raster.planes.map((_, c) => component(raster, c));
+  const share = alpha ? component(rasters(alpha - 1), 0) : null;
+  const channels = share ? 4 : 3;
+  const samples = new Float32Array(w * h * channels);
+  for (let i = 0, to = 0; i < w * h; i++, to += channels) {
+    const a = share ? share[i] : 1;
+    for (let c = 0; c < 3; c++) samples[to + c] = colours[Math.min(c, colours.length - 1)][i] * a;
+    if (share) samples[to + 3] = a;
+  }
+  return { samples, channels, w, h };
+}
+
+/** One component with what does not show filled (PYR-42). */
+function filled(values, shown, trusted, diffusion) {
+  const whole = new Int32Array(values.length);
+  for (let i = 0; i < whole.length; i++) {
+    if (trusted[i]) whole[i] = Math.round(FILL_ONE * values[i]);
+  }
+  diffusion.fill(whole);
+  return values.map((v, i) => (shown[i] ? v : whole[i] / FILL_ONE));
+}
+
+/** Weights of cubic convolution (PYR-43). */
+function keys(f, out) {
+  out[0] = (((2 - f) * f - 1) * f) / 2;
+  out[1] = ((3 * f - 5) * f * f + 2) / 2;
+  out[2] = (((4 - 3 * f) * f + 1) * f) / 2;
+  out[3] = ((f - 1) * f * f) / 2;
+}
+const across = new Float64Array(4);
+const down = new Float64Array(4);
+const sums = new Float64Array(4);
+
+/** Puts the colour at a texture point into out[at .. at + 3] (PYR-43, PYR-44). */
+export function sampleView({ samples, channels, w, h }, box, x, y, out, at) {
+  const u = clamp(((x - box[0]) * w) / box[2] - 0.5, 0, w - 1);
+  const v = clamp(((y - box[1]) * h) / box[3] - 0.5, 0, h - 1);
+  const [i, j] = [Math.floor(u), Math.floor(v)];
+  keys(u - i, across);
+  keys(v - j, down);
+  sums.fill(0);
+  sums[3] = channels === 3 ? 1 : 0;
+  for (let n = 0; n < 4; n++) {
+    if (!down[n]) continue;
+    const row = clamp(j + n - 1, 0, h - 1) * w;
+    for (let m = 0; m < 4; m++) {
+      const weight = down[n] * across[m];
+      if (!weight) continue;
+      const from = (row + clamp(i + m - 1, 0, w - 1)) * channels;
+      for (let c = 0; c < channels; c++) sums[c] += weight * samples[from + c];
+    }
+  }
+  const a = clamp(sums[3], 0, 1);
+  for (let c = 0; c < 3; c++) out[at + c] = clamp(sums[c], 0, a);
+  out[at + 3] = a;
+}
