@@ -58,10 +58,11 @@ def bake(
         if near or intervals == count:
             break
         intervals = min(int(np.ceil(intervals * GROWTH)), count)
+    parts = [_components(coefficients) for coefficients in found]
     modes = 1
     while True:
-        pairs = zip(found, wanted, strict=True)
-        tracks = [_track(basis, coefficients, w, modes) for coefficients, w in pairs]
+        pairs = zip(parts, wanted, strict=True)
+        tracks = [_track(basis, components, w, modes) for components, w in pairs]
         if modes == MODES or all(
             _worst(_shown(basis, t), w) <= tolerance for t, w in zip(tracks, wanted, strict=True)
         ):
@@ -85,12 +86,20 @@ def _solved(basis: Floats, wanted: Floats) -> Floats:
     return np.asarray(np.linalg.solve(normal, basis.T @ wanted))
 
 
-def _track(basis: Floats, coefficients: Floats, wanted: Floats, modes: int) -> Track:
-    """The track whose curves are the principal components of coefficients [K, 2 N]."""
-    left, strength, _ = np.linalg.svd(coefficients, full_matrices=False)
-    curves = np.zeros((modes, len(coefficients)))
-    curves[: left.shape[1]] = left.T[:modes]
-    curves[: len(strength)][strength[:modes] < 1e-9] = 0
+def _components(coefficients: Floats) -> Floats:
+    """Principal components of coefficients [K, 2 N], strongest first: [`MODES`, K]."""
+    # Of the K by K products, as there are far more nodes than coefficients.
+    power, vectors = np.linalg.eigh(coefficients @ coefficients.T)
+    curves = np.zeros((MODES, len(coefficients)))
+    strongest = vectors.T[::-1][:MODES]
+    curves[: len(strongest)] = strongest
+    curves[: len(power)][power[::-1][:MODES] < 1e-9] = 0
+    return curves
+
+
+def _track(basis: Floats, components: Floats, wanted: Floats, modes: int) -> Track:
+    """The track whose curves are the first of some components."""
+    curves = components[:modes]
     # The sign of a component is arbitrary: the largest coefficient decides, on every machine.
     peak = np.take_along_axis(curves, np.abs(curves).argmax(1)[:, None], 1)
     rounded = np.rint(curves / np.where(peak == 0, 1, peak) * (1 << CURVE_BITS))

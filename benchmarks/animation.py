@@ -1,0 +1,239 @@
+"""Animation: what a frame costs, what a motion adds to a file, and how steady the frames are.
+
+    python -m benchmarks.animation DATA [--only speed loops stored export flow features]
+
+DATA holds the Kodak pictures, their label maps and the emoji. The scene is the middle 512 x 512 of
+kodim23, with its two objects and an emoji in front of it as layers that move. Times are wall times,
+the least of several runs, as two threads are to be compared with one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import proxyimg_codec as pxi
+from benchmarks import consistency
+from benchmarks.common import Pixels, header, run_limited
+from benchmarks.editing import PICTURE, regions
+from proxyimg_codec import kernel, pictures
+from proxyimg_codec.animate.animate import amplitude, preset
+from proxyimg_codec.animate.motion import PRESETS
+from proxyimg_codec.animate.sequence import frames, times
+from proxyimg_codec.edit.geometry import meshed
+from proxyimg_codec.encoder.masks import Region
+from proxyimg_codec.export.clip import write_clip
+from proxyimg_codec.image import Image, Layers
+
+EMOJI = "emoji_fluent3d_1f98a.webp"
+SIDE, CORNER = 240, (136, 264)
+"""Size of the emoji in pixels, and where its corner is: x, y."""
+
+EDGE = 0.028
+"""Length of the edges of the meshes, relative to the diagonal of a layer."""
+
+SECONDS, FPS, RUNS = 4.0, 24, 3
+FLAGS = ("--preset", "breeze", "--separate", "--quiet")
+KINDS = ("mp4", "webm", "webp", "gif", "apng")
+MUST = {("implicit", "numpy"): 4, ("implicit", "native"): 15, ("pyramid", "native"): 20}
+"""Frames a second to be reached on two threads."""
+
+
+def scene(data: Path) -> tuple[Pixels, list[Region]]:
+    """The picture, and its three layers."""
+    import cv2
+
+    pixels, masks = regions(data, PICTURE)
+    emoji = pictures.read(data / "emoji" / EMOJI).pixels
+    emoji = cv2.resize(emoji, (SIDE, SIDE), interpolation=cv2.INTER_AREA).astype(float)
+    (x, y), alpha = CORNER, emoji[..., 3:] / 255
+    part = pixels[y : y + SIDE, x : x + SIDE]
+    part[:] = np.rint(part + (emoji[..., :3] - part) * alpha)
+    mask = np.zeros(pixels.shape[:2], bool)
+    mask[y : y + SIDE, x : x + SIDE] = alpha[..., 0] >= 0.5
+    return pixels, [*masks, Region("emoji", mask)]
+
+
+def encoded(data: Path, texture: str) -> Image:
+    """The scene as a picture, with meshes of the same fineness whatever the coder."""
+    pixels, masks = scene(data)
+    image = pxi.encode(pixels, masks=masks, texture=texture, effort=2, mesh="none")
+    layers = [image.layers[0], *(meshed(v, EDGE) for v in image.layers[1:])]
+    return replace(image, layers=Layers(layers))
+
+
+def moving(image: Image, name: str, progress: Callable[[int, int], None] | None = None) -> Image:
+    """The picture with a preset of four seconds, each layer a body of its own."""
+    motion = preset(image, name, together=False, duration=SECONDS, fps=FPS)
+    return image.animated(motion, progress=progress)
+
+
+def speed(paths: dict[str, Path]) -> None:
+    """Frames a second by stage, each engine and number of threads in a process of its own."""
+    print(
+        f"frames a second, {SECONDS:g} s of breeze at {FPS}; ms a frame by stage, on one thread: "
+        "simulation, fit of tracks, tracks and outlines, back layer, moving layers, MP4"
+    )
+    engines = ["numpy", "native"] if kernel.available() else ["numpy"]
+    for texture, path in paths.items():
+        for engine in engines:
+            for threads in (1, 2):
+                call = f"time_frames({str(path)!r}, {engine!r}, {threads})"
+                code = f"from benchmarks.animation import time_frames; {call}"
+                # With two, numpy's own threads are as any user has them.
+                said = run_limited(code, threads=1 if threads == 1 else None)[0]
+                must = MUST.get((texture, engine)) if threads == 2 else None
+                note = f"  (must reach {must})" if must else ""
+                print(f"  {texture:8s} {engine:6s} {threads} {said}{note}", flush=True)
+
+
+def time_frames(path: str, engine: str, threads: int) -> None:
+    """Prints the times of one engine; runs in a process of its own."""
+    image = pxi.open(path)
+    start = time.perf_counter()
+    image.render(engine=engine)
+    first = time.perf_counter() - start
+    simulation, fit, moved = min((_animated(image) for _ in range(RUNS)), key=lambda v: v[0] + v[1])
+    at = times(moved)
+    drawing = _least(lambda: list(frames(moved, at, jobs=threads, engine=engine)))
+    whole = simulation + fit + drawing
+    line = f"{len(at) / whole:5.1f} frames/s, drawing alone {len(at) / drawing:5.1f}"
+    if threads == 1:
+        parts = [simulation / len(at), fit / len(at), *_stages(moved, at, engine)]
+        line += f"; first frame {first:.2f} s; " + ", ".join(f"{1000 * p:.1f}" for p in parts)
+    print(line)
+
+
+def _stages(moved: Image, at: list[float], engine: str) -> list[float]:
+    """Seconds a frame: tracks and outlines, back layer, moving layers, MP4."""
+    few = at[:: len(at) // 16]
+
+    def placed() -> None:
+        for t in few:
+            for layer in moved.at(t).layers:
+                _ = layer.outline
+
+    def drawn(**options: Any) -> Callable[[], object]:
+        return lambda: [moved.render(t=t, engine=engine, **options) for t in few]
+
+    front = drawn(layers=list(range(1, len(moved.layers))), background=False)
+    parts = [_least(work) / len(few) for work in (placed, drawn(layers=[0]), front)]
+    shown = list(frames(moved, at, engine=engine))
+    return [*parts, _least(lambda: _clip(shown, "mp4")) / len(at)]
+
+
+def _least(work: Callable[[], object]) -> float:
+    """Seconds that some work takes: the least of some runs."""
+    spent = []
+    for _ in range(RUNS):
+        start = time.perf_counter()
+        work()
+        spent.append(time.perf_counter() - start)
+    return min(spent)
+
+
+def _animated(image: Image) -> tuple[float, float, Image]:
+    """Seconds of the simulation and of fitting tracks, and the picture that moves."""
+    start = done = time.perf_counter()
+
+    def progress(now: int, total: int) -> None:
+        nonlocal done
+        done = time.perf_counter()
+
+    moved = moving(image, "breeze", progress)
+    return done - start, time.perf_counter() - done, moved
+
+
+def _clip(shown: list[NDArray[np.uint8]], kind: str) -> int:
+    """Bytes of a clip of frames."""
+    height, width = shown[0].shape[:2]
+    with tempfile.TemporaryDirectory() as folder:
+        path = str(Path(folder) / f"clip.{kind}")
+        return write_clip(path, shown, fps=FPS, size=(width, height), alpha=False)
+
+
+def loops(image: Image) -> Iterator[str]:
+    """Whether a loop closes, and whether its seam shows, for each preset."""
+    yield (
+        "loops: frame at the end less frame at the beginning, most in 8-bit levels; RMS step over "
+        "the seam, relative to the largest of other steps; displacement of nodes, mean in px"
+    )
+    for name in PRESETS:
+        moved = moving(image, name)
+        first, last = (moved.render(t=t, dtype=np.float32) for t in (0.0, SECONDS))
+        away = 255 * float(np.abs(last - first).max())
+        shown = [f.astype(np.float32) for f in frames(moved, times(moved))]
+        steps = [consistency.rms(shown[k] - shown[k - 1]) for k in range(len(shown))]
+        seam = steps[0] / max(steps[1:])
+        yield f"  {name:7s} {away:.3f}  seam {seam:.2f}  {amplitude(moved):.1f} px"
+
+
+def stored(image: Image) -> Iterator[str]:
+    """What a motion adds to a file, for each preset."""
+    yield f"stored motion of {SECONDS:g} s in bytes (at most 30000): chunk mOTN, and with meshes"
+    plain = replace(image, layers=Layers(replace(v, mesh=None) for v in image.layers))
+    before = len(plain.to_bytes())
+    for name in PRESETS:
+        moved = moving(image, name)
+        size = next(c.size for c in moved.chunks if c.type == "mOTN")
+        yield f"  {name:7s} {size:6d} {len(moved.to_bytes()) - before:6d}"
+
+
+def export(paths: dict[str, Path]) -> Iterator[str]:
+    """Seconds of a clip by the command line's function: simulated, rendered and written."""
+    from proxyimg_codec.cli.animate import main as command
+
+    yield f"pxi-animate {' '.join(FLAGS)}, {SECONDS:g} s, 512x512: seconds (at most 30), bytes"
+    for texture, path in paths.items():
+        for kind in KINDS:
+            with tempfile.TemporaryDirectory() as folder:
+                out = Path(folder) / f"clip.{kind}"
+                start = time.perf_counter()
+                code = command([str(path), str(out), *FLAGS])
+                spent = time.perf_counter() - start
+                size = out.stat().st_size if code == 0 else 0
+            yield f"  {texture:8s} {kind:4s} {spent:5.1f} s {size:9d}" + " FAILED" * (code != 0)
+
+
+def main() -> None:
+    """Entry point."""
+    sections = ("speed", "loops", "stored", "export", "flow", "features")
+    p = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    p.add_argument("data", type=Path)
+    p.add_argument("--only", nargs="+", choices=sections, default=sections)
+    args = p.parse_args()
+    print(header(args.data))
+    images = {texture: encoded(args.data, texture) for texture in ("implicit", "pyramid")}
+    nodes = [len(v.mesh.refined.nodes) for v in images["pyramid"].layers if v.mesh]
+    print(f"{PICTURE} and {EMOJI}, 512x512, nodes {' + '.join(map(str, nodes))} = {sum(nodes)}")
+    with tempfile.TemporaryDirectory() as folder:
+        paths = {texture: Path(folder) / f"{texture}.pxi" for texture in images}
+        for texture, path in paths.items():
+            images[texture].save(path)
+        if "speed" in args.only:
+            away = amplitude(moving(images["pyramid"], "breeze"))
+            print(f"displacement of nodes, mean {away:.1f} px")
+            speed(paths)
+        lines: dict[str, Callable[[], Iterator[str]]] = {
+            "loops": lambda: loops(images["pyramid"]),
+            "stored": lambda: stored(images["pyramid"]),
+            "export": lambda: export(paths),
+            "flow": lambda: consistency.flow(images, moving),
+            "features": lambda: consistency.features(images, moving, args.data),
+        }
+        for section, work in lines.items():
+            if section in args.only:
+                for line in work():
+                    print(line, flush=True)
+
+
+if __name__ == "__main__":
+    main()

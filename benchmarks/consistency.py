@@ -1,0 +1,202 @@
+"""How steady the frames of a picture that moves are: along its flow, and in features of gradients.
+
+A part of `benchmarks.animation`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.common import Pixels, centre_crop, kodak, read_rgb
+from proxyimg_codec.animate.animate import amplitude
+from proxyimg_codec.animate.motion import PRESETS
+from proxyimg_codec.geometry import coverage as cover
+from proxyimg_codec.geometry.mesh import FRACTION_BITS
+from proxyimg_codec.geometry.warp import Warp
+from proxyimg_codec.image import Image
+from proxyimg_codec.render.compose import outline
+from proxyimg_codec.render.view import View, make_view
+
+Real = NDArray[np.float64]
+Moving = Callable[[Image, str], Image]
+
+MARGIN = 2
+"""Pixels round outlines that are left out."""
+
+ENLARGED = 4
+"""Samples a pixel, across and down, that frames are warped from, so that interpolation is near
+enough exact."""
+
+PAIRS = 7
+"""Pairs of consecutive frames, spread over the clip."""
+
+NOWHERE = -1
+
+SCALES = 3
+
+CROSS = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
+DISC = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * MARGIN + 1, 2 * MARGIN + 1))
+
+
+def rms(values: NDArray[Any]) -> float:
+    """Root mean square."""
+    return float(np.sqrt((values.astype(np.float64) ** 2).mean())) if values.size else 0.0
+
+
+def labels(image: Image, view: View) -> NDArray[np.int64]:
+    """The layer [H, W] seen at each pixel of a still, or `NOWHERE` within `MARGIN` of outlines."""
+    seen = np.zeros((view.height, view.width), np.int64)
+    near = np.zeros(seen.shape, np.uint8)
+    for number, layer in enumerate(image.layers):
+        paths = outline(layer.outline, view)
+        if paths is None:
+            continue
+        covered = cover.coverage(paths, 0, 0, view.width, view.height)
+        seen[covered > 0] = number
+        # The rim of what is covered in full: outlines may lie on the edges of pixels.
+        full = (covered == cover.FULL).astype(np.uint8)
+        near |= np.asarray(cv2.morphologyEx(full, cv2.MORPH_GRADIENT, CROSS), np.uint8)
+        near |= ((covered > 0) & (covered < cover.FULL)).astype(np.uint8)
+    return np.where(cv2.dilate(near, DISC) > 0, NOWHERE, seen)
+
+
+def origins(before: Image, after: Image, seen: NDArray[np.int64], view: View) -> Real:
+    """Where the point of the texture that a pixel of one still shows was in the still before.
+
+    Args:
+        before: A still.
+        after: A later one of the same picture.
+        seen: The layer [H, W] that `after` shows, or `NOWHERE`.
+        view: Of the whole canvas.
+
+    Returns:
+        float64 [H, W, 2] canvas points x, y; nan where no layer that has a mesh is seen.
+    """
+    out = np.full((*seen.shape, 2), np.nan)
+    box = (0, 0, view.width, view.height)
+    for number, (old, new) in enumerate(zip(before.layers, after.layers, strict=True)):
+        row, column = np.nonzero(seen == number)
+        if new.mesh is None or not len(row):
+            continue
+        refined = new.mesh.refined
+        warp = Warp(new.pose, new.mesh, meshed=True)
+        face = warp.faces(*view.grid, box)[row, column]
+        x, y = view.columns(0, view.width)[column], view.rows(0, view.height)[row]
+        found = warp.locate(x, y, face)
+        assert found.face is not None
+        assert found.weights is not None
+        corners = old.pose.present(refined)[refined.faces[found.face]] / (1 << FRACTION_BITS)
+        out[row, column] = (found.weights[..., None] * corners).sum(1)
+    return out
+
+
+def warped(picture: NDArray[np.float32], points: Real, scale: int) -> NDArray[np.float32]:
+    """Colours [H, W, 3] of a picture at canvas points [H, W, 2]; `scale` samples are a pixel."""
+    at = np.nan_to_num(points * scale - 0.5, nan=0.0).astype(np.float32)
+    x, y = np.ascontiguousarray(at[..., 0]), np.ascontiguousarray(at[..., 1])
+    border = cv2.BORDER_REPLICATE
+    return np.asarray(cv2.remap(picture, x, y, cv2.INTER_CUBIC, borderMode=border), np.float32)
+
+
+def pair(before: Image, after: Image) -> list[float]:
+    """Sums over the pixels of two stills that show the same point of the same moving layer.
+
+    Returns:
+        Their number; the squared differences in 8-bit levels, mean over channels, along the flow
+        from enlarged frames, along it from frames as they are, and of standing still; the
+        displacements in pixels.
+    """
+    view = make_view((after.width, after.height))
+    then, now = labels(before, view), labels(after, view)
+    points = origins(before, after, now, view)
+    last = np.array([view.width, view.height]) - MARGIN
+    inside = np.asarray((points >= MARGIN).all(2) & (points < last).all(2))
+    x, y = np.where(inside[..., None], points, 0).astype(int).transpose(2, 0, 1)
+    good = inside & (now > 0) & (then[y, x] == now)
+    small, large, result = (
+        255 * still.render(dtype=np.float32, scale=scale)[..., :3]
+        for still, scale in ((before, 1), (before, ENLARGED), (after, 1))
+    )
+    tries = (warped(large, points, ENLARGED), warped(small, points, 1), small)
+    squares = [float(((t - result)[good].astype(float) ** 2).mean(1).sum()) for t in tries]
+    row, column = np.nonzero(good)
+    centres = np.stack(
+        [view.columns(0, view.width)[column], view.rows(0, view.height)[row]], axis=1
+    )
+    return [float(len(row)), *squares, float(np.hypot(*(points[good] - centres).T).sum())]
+
+
+def flow(images: dict[str, Image], moving: Moving) -> Iterator[str]:
+    """Temporal consistency, for each coder and preset."""
+    yield (
+        f"flow: RMS difference of consecutive frames in 8-bit levels, {MARGIN} px within moving "
+        f"layers, {PAIRS} pairs: warped along the known flow from frames of {ENLARGED}x, from "
+        "frames as they are (with OpenCV's cubic interpolation), and of standing still; share of "
+        "pixels compared; displacement from frame to frame, mean in px"
+    )
+    for texture, image in images.items():
+        for name in PRESETS:
+            moved = moving(image, name)
+            assert moved.timeline is not None
+            count, fps = moved.timeline.frames, moved.timeline.fps
+            at = [k * count // PAIRS for k in range(PAIRS)]
+            sums = np.sum([pair(moved.at(k / fps), moved.at((k + 1) / fps)) for k in at], axis=0)
+            pixels, *squares, length = sums.tolist()
+            exact, plain, idle = (np.sqrt(s / max(pixels, 1)) for s in squares)
+            share = 100 * pixels / (PAIRS * image.width * image.height)
+            yield (
+                f"  {texture:8s} {name:7s} {exact:5.2f} {plain:5.2f} {idle:6.2f}  {share:2.0f} %  "
+                f"{length / max(pixels, 1):.2f} px"
+            )
+
+
+def hog(pixels: Pixels) -> list[NDArray[np.float32]]:
+    """Histograms of oriented gradients (Dalal, Triggs 2005), at each scale a unit vector.
+
+    Cells of 8 samples with 9 orientations, in blocks of 2 x 2 cells with OpenCV's normalization, of
+    grey pictures of full, half and quarter size, whose sides are multiples of 8.
+    """
+    grey = cv2.cvtColor(pixels, cv2.COLOR_RGB2GRAY)
+    found = []
+    for k in range(SCALES):
+        size = (grey.shape[1] >> k, grey.shape[0] >> k)
+        small = cv2.resize(grey, size, interpolation=cv2.INTER_AREA)
+        vector = np.ravel(cv2.HOGDescriptor(size, (16, 16), (8, 8), (8, 8), 9).compute(small))
+        found.append(np.asarray(vector / max(float(np.linalg.norm(vector)), 1e-9), np.float32))
+    return found
+
+
+def distance(one: Pixels, other: Pixels) -> Real:
+    """Distances of two pictures at each scale: 0 to the square root of 2."""
+    return np.array([np.linalg.norm(a - b) for a, b in zip(hog(one), hog(other), strict=True)])
+
+
+def features(images: dict[str, Image], moving: Moving, data: Path) -> Iterator[str]:
+    """Distance of frames from the still, for each preset; beside it, that of other pictures."""
+    yield (
+        "features: HOG distance of frames from the still, mean in cells of 8, 16 and 32 px "
+        "(histograms of oriented gradients; not a learned metric: the weights of LPIPS, CLIP or "
+        "DINO come with none of the packages used here); displacement of nodes, mean in px"
+    )
+    image = images["pyramid"]
+    still = image.render()
+    others = [centre_crop(read_rgb(p)) for p in kodak(data) if "23" not in p.stem]
+    scales = {"other Kodak pictures": others, "the still, 8 px aside": [np.roll(still, 8, 1)]}
+    for what, pictures in scales.items():
+        yield f"  {_mean(still, pictures)}  for scale: {what}"
+    for name in PRESETS:
+        moved = moving(image, name)
+        assert moved.timeline is not None
+        shown = [moved.render(t=k * moved.timeline.seconds / PAIRS) for k in range(PAIRS)]
+        yield f"  {_mean(still, shown)}  {name:7s} {amplitude(moved):.1f} px"
+
+
+def _mean(still: Pixels, shown: list[Pixels]) -> str:
+    mean = np.mean([distance(still, frame) for frame in shown], axis=0)
+    return " ".join(f"{v:.3f}" for v in mean)
