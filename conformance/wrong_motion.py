@@ -84,7 +84,7 @@ def _riding_after(boundary: Any, posed: Pose, meshed: Any, size: Any) -> Any:
     still = replace(posed, matrix=REST.matrix, shift=(0, 0))
     moved = outline_of(boundary, replace(still, nodes=None), meshed, size)
     rest = outline_of(boundary, replace(still, nodes=None, sway=0 * posed.sway), meshed, size)
-    paths = zip(before.paths, moved.paths, rest.paths, strict=True)  # type: ignore[union-attr]
+    paths = zip(before.paths, moved.paths, rest.paths, strict=True)  # type: ignore[union-attr]  # none is None
     return Boundary(10, tuple(a + b - c for a, b, c in paths))
 
 

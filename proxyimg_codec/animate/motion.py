@@ -266,7 +266,7 @@ def _layer(values: dict[str, Any]) -> LayerMotion:
 
 def _spot(value: Any) -> Spot:
     if isinstance(value, str):
-        return value  # type: ignore[return-value]
+        return value  # type: ignore[return-value]  # `check` has seen that it is a side
     return Rectangle(**value) if "box" in value else Disc(**value)
 
 

@@ -159,10 +159,9 @@ def run(tasks: Sequence[Task], jobs: int, finished: Callable[[Row | Failure], No
                 for future in as_completed([pool.submit(measure, t) for t in tasks]):
                     finished(future.result())
             except BaseException:  # Ctrl-C too must leave no worker behind
-                pool.shutdown(wait=False, cancel_futures=True)
                 for process in multiprocessing.active_children():
                     process.terminate()
-                    process.join()
+                pool.shutdown(cancel_futures=True)
                 raise
     except BrokenProcessPool:
         raise LimitError("a worker process was killed, most likely for want of memory; "
