@@ -56,8 +56,8 @@ def _mask(layer: Layer, size: Size) -> NDArray[np.bool_]:
         for p in layer.boundary.paths
     ]
     near = cover.coverage(paths, 0, 0, columns, rows) > 0
-    for axis, reach in ((0, NEAR // 2), (1, NEAR // 2)):
-        for _ in range(reach):
+    for axis in (0, 1):
+        for _ in range(NEAR // 2):
             padded = np.pad(near, [(1, 1) if k == axis else (0, 0) for k in (0, 1)])
             near = near | np.take(padded, range(2, near.shape[axis] + 2), axis)
             near |= np.take(padded, range(near.shape[axis]), axis)

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..animate.presets import PRESETS
 from ..errors import UsageError
 from .common import EXIT_CODES, Bar, check_target, parser, run
 from .decode import key
@@ -16,8 +17,6 @@ from .decode import key
 if TYPE_CHECKING:
     from ..animate.motion import Motion
     from ..image import Image
-
-PRESETS = ("sway", "breeze", "jelly", "wave", "bounce", "flame", "breathe")
 
 TARGETS = """OUT: .mp4, .webm, .webp, .gif or .apng; a folder/ or name-%04d.png for a file a frame;
 .png with --sheet for a sprite sheet and its .json; .pxi for a picture that carries the motion.
@@ -37,7 +36,7 @@ def arguments() -> argparse.ArgumentParser:
     add = p.add_argument
     add("input", metavar="IN", help=".pxi file, or - for standard input")
     add("output", metavar="OUT", help="where the clip goes, type by suffix")
-    add("--preset", choices=PRESETS, help="a motion that suits any picture")
+    add("--preset", choices=list(PRESETS), help="a motion that suits any picture")
     add("--motion", metavar="FILE", help="a motion file, JSON")
     add("--layer", action="append", metavar="NAME|INDEX", help="let only this layer move; "
         "repeatable; with --preset")  # fmt: skip
