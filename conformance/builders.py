@@ -12,7 +12,7 @@ import msgpack
 import numpy as np
 from numpy.typing import NDArray
 
-from proxyimg_codec.container.chunks import VERSION, Chunk, read, write
+from proxyimg_codec.container.chunks import Chunk, read, write
 from proxyimg_codec.container.fields import unpack
 from proxyimg_codec.container.file import fields_of
 from proxyimg_codec.geometry.boundary import Boundary
@@ -245,9 +245,7 @@ def changed(chunk: Chunk, new: Mapping[str, Any], *, in_map: bool = False) -> Ch
     return replace(chunk, payload=msgpack.packb(content if in_map else list(content.values())))
 
 
-def with_maps(
-    data: bytes, version: tuple[int, int] = VERSION, without: Sequence[str] = ()
-) -> bytes:
+def with_maps(data: bytes, version: tuple[int, int], without: Sequence[str] = ()) -> bytes:
     """A file of another version, with maps in all chunks but those of the types `without`."""
     return write(
         [

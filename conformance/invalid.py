@@ -10,7 +10,7 @@ from typing import Any
 import msgpack
 import numpy as np
 
-from proxyimg_codec.container.chunks import Chunk, read, write
+from proxyimg_codec.container.chunks import MAPS_UNTIL, Chunk, read, write
 from proxyimg_codec.entropy import arrays
 from proxyimg_codec.image import Image
 
@@ -57,8 +57,12 @@ class Base:
         return self.payload(at, changed(self.chunks[at], new).payload)
 
     def map(self, at: int, **new: Any) -> bytes:
-        """The same with a map."""
-        return self.payload(at, changed(self.chunks[at], new, in_map=True).payload)
+        """The same with a map, in a file of a version that has maps."""
+        return self.old(at, changed(self.chunks[at], new, in_map=True).payload)
+
+    def old(self, at: int, payload: bytes) -> bytes:
+        """A file of version 0.3 with another payload of chunk `at`."""
+        return write(read(self.payload(at, payload)), MAPS_UNTIL)
 
     def edit(self, at: int, key: str, change: Callable[[bytes], bytes]) -> bytes:
         """Chunk `at` with the bytes of one field changed."""
@@ -159,6 +163,8 @@ _FRAMING: list[_Row] = [
     ("unsupported-version", "format 1.2", "file: version", lambda b: put(b.data, 8, lambda v: 1)),
     ("unsupported-version-0-4", "format 0.4", "file: version",
      lambda b: put(b.data, 9, lambda v: 4)),
+    ("unsupported-version-0-10", "format 0.10", "file: version",
+     lambda b: put(b.data, 9, lambda v: 10)),
     ("unsupported-version-0-0", "format 0.0", "file: version",
      lambda b: put(b.data, 9, lambda v: 0)),
     ("unsupported-chunk", "an unknown critical chunk", "chunk: critical",
@@ -197,14 +203,16 @@ _STRUCTURE: list[_Row] = [
     ("invalid-value-order", "the values in the opposite order", "fields",
      lambda b: b.payload(DISC_TEXR, msgpack.packb([*b.fields(DISC_TEXR).values()][::-1]))),
     ("invalid-key-order", "a map in the opposite order", "canonical form: maps",
-     lambda b: b.payload(HEAD, msgpack.packb(dict(reversed(b.fields(HEAD).items()))))),
+     lambda b: b.old(HEAD, msgpack.packb(dict(reversed(b.fields(HEAD).items()))))),
     ("invalid-key-order-texture", "a map in the opposite order, the coder last",
      "canonical form: maps",
-     lambda b: b.payload(DISC_TEXR, msgpack.packb(dict(reversed(b.fields(DISC_TEXR).items()))))),
+     lambda b: b.old(DISC_TEXR, msgpack.packb(dict(reversed(b.fields(DISC_TEXR).items()))))),
     ("invalid-key-missing", "a map without one of the keys", "fields: maps",
      lambda b: b.map(HEAD, depth=None)),
     ("invalid-key-unknown", "a map with a key too many", "fields: maps",
      lambda b: b.map(HEAD, more=1)),
+    ("invalid-map", "a map in a file of a version without maps", "fields: maps",
+     lambda b: b.payload(HEAD, changed(b.chunks[HEAD], {}, in_map=True).payload)),
     ("invalid-no-array", "a payload that is an integer", "fields",
      lambda b: b.payload(HEAD, b"\x07")),
     ("invalid-long-array", "a payload with three bytes of header for one", "canonical form",
@@ -213,7 +221,7 @@ _STRUCTURE: list[_Row] = [
      lambda b: b.payload(HEAD, _long(b.chunks[HEAD]))),
     ("invalid-long-integer-map", "an integer in two bytes for one, in a map",
      "canonical form: maps",
-     lambda b: b.payload(HEAD, _long(changed(b.chunks[HEAD], {}, in_map=True)))),
+     lambda b: b.old(HEAD, _long(changed(b.chunks[HEAD], {}, in_map=True)))),
     ("invalid-float", "a float for an integer", "fields", lambda b: b.set(HEAD, depth=8.0)),
     ("invalid-boolean", "true for 1", "fields", lambda b: b.set(HEAD, opaque=True)),
     ("invalid-payload-end", "a byte after the array", "canonical form",

@@ -280,8 +280,6 @@ _VIEWS: list[_Row] = [
      lambda b: b.set(DISC, sampling=3)),
     ("invalid-view-values", "a view with the coder of an implicit texture", "fields",
      lambda b: b.set(DISC_TEXR, coder=1)),
-    ("invalid-cuts-mask", "a mask and cuts", "pyramid: cuts", lambda b: b.set(
-        DISC_TEXR, cuts=[1])),
     ("invalid-cuts-size", "cuts of a part that is smaller than the box", "pyramid: cuts",
      lambda b: _cuts(b, [1], part=[4, 3, 15, 12])),
     ("invalid-cuts-behind", "cuts by a layer behind", "pyramid: cuts", lambda b: _cuts(b, [0])),

@@ -192,10 +192,9 @@ def _history(state: bytes, history: bytes, size: int) -> Chunk:
 def _undo(n: Numbers) -> bytes:
     data = layered(n).to_bytes()
     present = read(data)[:-1]
-    # A map of no chunks and one step "{}" that refers to all chunks, in one raw zstd block.
+    # No chunks, and one step "{}" that refers to all chunks, in one raw zstd block.
     count = len(present)
-    steps = b"\x91\x92\xa2{}" + bytes([0x90 + count, *range(count)])
-    history = b"\x82\xa6chunks\x90\xa5steps" + steps
+    history = b"\x92\x90\x91\x92\xa2{}" + bytes([0x90 + count, *range(count)])
     head = (len(history) << 3 | 1).to_bytes(3, "little")
     frame = b"\x28\xb5\x2f\xfd\x20" + bytes([len(history)]) + head + history
     return _with(data, _history(undo.digest(present), frame, len(history)))
@@ -217,9 +216,9 @@ def _version_0_2(n: Numbers) -> bytes:
     return with_maps(on_back(n, disc(n, mesh, nodes=bend(n, mesh))).to_bytes(), (0, 2))
 
 
-@_case("A file of version 0.3 with maps, but arrays in the layers", "fields: maps")
-def _maps(n: Numbers) -> bytes:
-    return with_maps(layered(n).to_bytes(), without=["LAYR"])
+@_case("A file of version 0.3 with maps, but arrays in the layers", "file: version", "fields: maps")
+def _version_0_3(n: Numbers) -> bytes:
+    return with_maps(layered(n).to_bytes(), (0, 3), without=["LAYR"])
 
 
 @_case("A file of version 0.2 with arrays", "file: version", "fields: maps")

@@ -194,6 +194,36 @@ def _pyramid_cuts_bent(n: Numbers) -> Image:
     return replace(made, layers=Layers(layers))
 
 
+def _masked(made: Image, name: str, mask: _Mask, cell: int) -> Image:
+    """A picture with a mask beside the cuts of a layer."""
+    layers = list(made.layers)
+    at = [v.name for v in layers].index(name)
+    shown = layers[at].texture
+    assert isinstance(shown, PyramidTexture)
+    assert shown.cuts is not None
+    _, _, w, h = shown.part
+    within = mask.repeat(1 << cell, 0)[:h].repeat(1 << cell, 1)[:, :w]
+    cuts = replace(shown.cuts, within=within)
+    layers[at] = replace(layers[at], texture=replace(shown, mask=mask, cell=cell, cuts=cuts))
+    return replace(made, layers=Layers(layers))
+
+
+@_case("A mask and cuts together", "pyramid: cuts", "pyramid: mask", "pyramid: fill",
+       renders=[WHOLE, CLOSE, {"layers": ["back"]}, {"layers": ["disc"]}])  # fmt: skip
+def _pyramid_cuts_mask(n: Numbers) -> Image:
+    made = _cut(n, Pose(shift=(6 * 1024, -3 * 1024 - 511)))
+    back = np.ones((9, 12), bool)
+    back[2:5, 1:4] = False
+    front = np.arange(16)[None] + np.arange(12)[:, None] > 8
+    return _masked(_masked(made, "back", back, 1), "disc", front, 0)
+
+
+@_case("A mask of what cuts take as a whole: all of the mask shows", "pyramid: cuts",
+       "pyramid: mask", renders=[{"layers": ["back"]}])  # fmt: skip
+def _pyramid_cuts_mask_all(n: Numbers) -> Image:
+    return _masked(_cut(n), "back", _inside((-4, -3, *SIZE)) & _inside((4, 3, *SIZE)), 0)
+
+
 @_case("Cuts that leave nothing: all samples show", "pyramid: cuts",
        renders=[{"layers": ["back"]}])  # fmt: skip
 def _pyramid_cuts_all(n: Numbers) -> Image:

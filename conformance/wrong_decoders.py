@@ -76,36 +76,44 @@ def _lenient_halves(data: bytes, count: int, *_: Any, **__: Any) -> Any:
     return np.resize(np.frombuffer(data, "<f2").astype(np.float16), count)
 
 
-def _lenient_fields(declared: tuple[fields.Field, ...], payload: bytes, where: str) -> Any:
+def _lenient_fields(
+    declared: tuple[fields.Field, ...], payload: bytes, where: str, **how: Any
+) -> Any:
     try:
-        return fields_of(declared, payload, where)
+        return fields_of(declared, payload, where, **how)
     except FormatError as error:
         if "canonical" not in str(error):
             raise
-        return fields_of(declared, msgpack.packb(msgpack.unpackb(payload)), where)
+        return fields_of(declared, msgpack.packb(msgpack.unpackb(payload)), where, **how)
 
 
-def _ignoring_more(declared: tuple[fields.Field, ...], payload: bytes, where: str) -> Any:
+def _ignoring_more(
+    declared: tuple[fields.Field, ...], payload: bytes, where: str, **how: Any
+) -> Any:
     try:
-        return fields_of(declared, payload, where)
+        return fields_of(declared, payload, where, **how)
     except FormatError as error:
         if " values instead of " not in str(error):
             raise
         first = msgpack.unpackb(payload)[: len(declared)]
-        return fields_of(declared, msgpack.packb(first), where)
+        return fields_of(declared, msgpack.packb(first), where, **how)
 
 
-def _sorting_keys(declared: tuple[fields.Field, ...], payload: bytes, where: str) -> Any:
+def _sorting_keys(
+    declared: tuple[fields.Field, ...], payload: bytes, where: str, **how: Any
+) -> Any:
     content = msgpack.unpackb(payload)
     if isinstance(content, dict) and content.keys() == {f.key for f in declared}:
         payload = msgpack.packb([content[f.key] for f in declared])
-    return fields_of(declared, payload, where)
+    return fields_of(declared, payload, where, **how)
 
 
-def _refusing_maps(declared: tuple[fields.Field, ...], payload: bytes, where: str) -> Any:
+def _refusing_maps(
+    declared: tuple[fields.Field, ...], payload: bytes, where: str, **how: Any
+) -> Any:
     if payload[:1] < b"\x90":
         raise FormatError("not an array", where)
-    return fields_of(declared, payload, where)
+    return fields_of(declared, payload, where, **how)
 
 
 def _hanging(*_: Any) -> int:
@@ -178,6 +186,7 @@ FAULTS: dict[str, list[Patch]] = {
     "accepts-more-values": [(file, "unpack", _ignoring_more)],
     "accepts-any-order-of-keys": [(file, "unpack", _sorting_keys)],
     "refuses-maps": [(file, "unpack", _refusing_maps)],
+    "reads-maps-in-all-versions": [(chunks, "MAPS_UNTIL", (0, 9))],
     **FAULTS_OF_POSES,
     **FAULTS_OF_PYRAMIDS,
     **FAULTS_OF_MOTION,

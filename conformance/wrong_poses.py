@@ -195,10 +195,10 @@ FAULTS: dict[str, list[Patch]] = {
     "shared-box": [(file, "parse", _box_of_texture)],
     "local-is-direct": [(file, "parse", _all_direct)],
     "follows-parents": [(image, "from_bytes", _following_parents)],
-    "believes-histories": [(undo, "digest", lambda _: Anything())],
+    "believes-histories": [(undo, "digest", lambda *_: Anything())],
     "accepts-contradictions": [(check, "check", lambda *a: None)],
-    "reads-only-0.3": [(chunks, "READABLE", ((0, 3),))],
-    "reads-the-future": [(chunks, "READABLE", tuple((0, k) for k in range(1, 9)))],
+    "reads-only-0.9": [(chunks, "READABLE", ((0, 9),))],
+    "reads-the-future": [(chunks, "READABLE", tuple((0, k) for k in range(1, 20)))],
     "accepts-idle-poses": [(Pose, "at_rest", False)],
 }  # fmt: skip
 """What each wrong decoder replaces."""

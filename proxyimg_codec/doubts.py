@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from . import markup
 from .container import layr, meta, motn, pose
-from .container.chunks import VERSION, Chunk
-from .container.file import Container, fields_of
+from .container.chunks import VERSION
+from .container.file import Container
 from .errors import PxiError
 from .image import Image, Layer
 
@@ -30,11 +30,10 @@ CODES = {
     "VAL-10": "a layer that should move but does not",
     "VAL-11": "a history that was not checked as a whole, because it is too long",
     "VAL-12": "a version of the format before the present one",
-    "VAL-13": "chunks in the form of an earlier version: maps",
 }
-"""Codes of what is odd. The last two are notes, all others warnings."""
+"""Codes of what is odd. The last is a note, all others are warnings."""
 
-_NOTES = ("VAL-12", "VAL-13")
+_NOTES = ("VAL-12",)
 
 
 @dataclass(frozen=True)
@@ -69,13 +68,12 @@ def doubt(code: str, detail: str, chunk: str = "", offset: int | None = None) ->
     return Issue(code, severity, f"{CODES[code]}: {detail}", chunk, offset)
 
 
-def find(image: Image, c: Container, chunks: Sequence[Chunk], place: Place) -> Iterator[Issue]:
+def find(image: Image, c: Container, place: Place) -> Iterator[Issue]:
     """What is odd in a valid file.
 
     Args:
         image: The picture.
         c: Its container.
-        chunks: All chunks of the file.
         place: Tells where a chunk is.
     """
     for chunk in c.extra:
@@ -83,9 +81,6 @@ def find(image: Image, c: Container, chunks: Sequence[Chunk], place: Place) -> I
     yield from _metadata(image, c, place)
     for i, layer in enumerate(image.layers):
         yield from _layer(i, layer, c, place)
-    maps = [v for v in chunks if v.payload[:1] < b"\x90" and fields_of(v)]
-    if maps:
-        yield doubt("VAL-13", f"{len(maps)} of {len(chunks)} chunks", maps[0].type, maps[0].offset)
 
 
 def old(version: tuple[int, int]) -> Iterator[Issue]:

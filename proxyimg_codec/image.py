@@ -134,7 +134,7 @@ def _apart(view: Texture, pose: Pose, layers: Sequence[Layer], home: int) -> Apa
 
 
 def _settled(layers: Sequence[Layer]) -> list[Layer]:
-    """Layers whose views have a mask where a boundary that cuts them is not in its place."""
+    """Layers whose views have a mask for each boundary that cut them and is gone."""
     boundaries = [layer.boundary for layer in layers]
     shown: dict[Texture, Texture] = {}
     for i, layer in enumerate(layers):
@@ -147,8 +147,10 @@ def _settled(layers: Sequence[Layer]) -> list[Layer]:
             home = next((k for k in sharing if layers[k].box == view.cuts.box), None)
             if home is None:
                 shown[view] = view.masked(view.cuts.everything)
-            elif home > i or view.cuts.numbers(i, boundaries) is None:
+            elif home > i:
                 shown[view] = view.masked(_apart(view, layers[home].pose, layers, home))
+            elif view.cuts.numbers(i, boundaries) is None:
+                shown[view] = view.masked(*view.cuts.gone(i, boundaries))
     return [replace(layer, texture=shown[layer.texture]) for layer in layers]
 
 

@@ -14,7 +14,7 @@ import msgpack
 from .container import file as container
 from .container import head, layr, plan, texr, undo
 from .container.chunks import Chunk, read_damaged, write
-from .container.fields import pack, unpack
+from .container.fields import pack
 from .container.file import Container
 from .errors import FormatError
 from .geometry import boundary
@@ -42,7 +42,7 @@ def parse(data: bytes, limits: Limits) -> tuple[Container, tuple[str, ...]]:
     except FormatError as error:
         notes.append(str(error))
         chunks, wrong = _usable(*read_damaged(data, limits), notes)
-        content = container.parse(write([*chunks, _END]), limits)
+        content = container.parse(write([*chunks, _END], chunks[0].version), limits)
     sound = []
     for number, fields in enumerate(content.planes):
         read = planes.unpack(fields, f"chunk PLAN {number}")
@@ -72,7 +72,7 @@ def _usable(
         if chunk.type == plan.TYPE:
             if k in wrong:
                 doubtful[sum(c.type == plan.TYPE for c in kept)] = wrong[k]
-                chunk = Chunk(chunk.type, _closed(chunk.payload, where))
+                chunk = replace(chunk, payload=_closed(chunk.payload, where))
             kept.append(chunk)
         elif k not in wrong:
             kept += [chunk] if chunk.type not in (undo.TYPE, _END.type) else []
@@ -84,7 +84,7 @@ def _usable(
             notes.append(f"{where} is left out")
     if not kept or kept[0].type != head.TYPE:
         raise FormatError("too little of the file is there: not even the chunk HEAD", rule="CON-11")
-    header = unpack(head.FIELDS, kept[0].payload, "chunk HEAD")
+    header = container.values(kept[0])
     textures = sum(c.type == texr.TYPE for c in kept)
     if textures < header["layers"]:
         kept = _one_layer(kept)
@@ -118,10 +118,10 @@ def _one_layer(chunks: Sequence[Chunk]) -> list[Chunk]:
     Raises:
         FormatError: There is none, or it does not have the size of an opaque canvas.
     """
-    header = unpack(head.FIELDS, chunks[0].payload, "chunk HEAD")
-    found = {c.type: c.payload for c in reversed(chunks)}
+    header = container.values(chunks[0])
+    found = {c.type: c for c in reversed(chunks)}
     size = header["size"]
-    raster = unpack(plan.FIELDS, found[plan.TYPE], "chunk PLAN") if plan.TYPE in found else {}
+    raster = container.values(found[plan.TYPE]) if plan.TYPE in found else {}
     if not header["opaque"] or raster.get("size") != size:
         raise FormatError(
             "cut off before the textures of its layers, and no raster stands for them"
@@ -133,6 +133,6 @@ def _one_layer(chunks: Sequence[Chunk]) -> list[Chunk]:
     return [
         Chunk(head.TYPE, pack(head.FIELDS, {**header, "layers": 1, "networks": 0})),
         Chunk(layr.TYPE, pack(layr.FIELDS, layer)),
-        Chunk(plan.TYPE, found[plan.TYPE]),
+        Chunk(plan.TYPE, pack(plan.FIELDS, raster)),
         Chunk(texr.TYPE, pack(texr.PYRAMID_FIELDS, view)),
     ]

@@ -95,7 +95,7 @@ class _Check:
         if content is not None:
             self._streams(content)
             if not self._failed:
-                self._try(partial(self._picture, content, chunks))
+                self._try(partial(self._picture, content))
                 self.issues += doubts.old((data[8], data[9]))
             self._history(content.history)
 
@@ -161,11 +161,12 @@ class _Check:
         if file.fields_of(chunk):
             self._values_of(chunk)
         if chunk.type in meta.BLOCKS.values():
-            meta.decompress(chunk.payload, "", self._limits)
+            meta.decompress(chunk, "", self._limits)
         if chunk.type == undo.TYPE:
             present = [c for c in chunks if c.type not in (undo.TYPE, _END.type)]
-            undo.decode(chunk.payload, present, "", self._limits)
-            if self._intact and self._values_of(chunk)["state"] != undo.digest(present):
+            undo.decode(chunk, present, "", self._limits)
+            state = undo.digest(present, chunk.old)
+            if self._intact and self._values_of(chunk)["state"] != state:
                 self.issues.append(doubts.doubt("VAL-2", "it is ignored", undo.TYPE, chunk.offset))
         return True
 
@@ -243,14 +244,14 @@ class _Check:
             if None not in sources:
                 self._once(texr.TYPE, i, cost, work, *parts)
 
-    def _picture(self, c: Container, chunks: Sequence[Chunk]) -> None:
+    def _picture(self, c: Container) -> None:
         """What it takes to show the picture, and what is odd about it."""
         image = packing.unpack(c, self._limits)
         self._limits.check("output_pixels", image.width * image.height)
         for i, layer in enumerate(image.layers):
             self._try(partial(self._drawing, image, layer), layr.TYPE, i)
         if not self._failed:
-            self.issues += doubts.find(image, c, chunks, self._place)
+            self.issues += doubts.find(image, c, self._place)
 
     def _drawing(self, image: Image, layer: Layer) -> None:
         """Tries what bent layers cost, at a small size."""

@@ -105,7 +105,7 @@ def valid(chunk: chunks.Chunk) -> bool:
     """Whether a chunk is a structured one and has the values that it must have."""
     try:
         fields = fields_of(chunk)
-        unpack(fields, chunk.payload, "")
+        unpack(fields, chunk.payload, "", old=chunk.old)
     except PxiError:
         return False
     return bool(fields)

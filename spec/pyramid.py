@@ -1,4 +1,4 @@
-"""The generated parts of chapter 11: the registered models, tables, a worked example."""
+"""The generated parts of chapter 8: the registered models, tables, a worked example."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The generated parts of the chapters: `python -m spec.tables` checks them, `--write` renews them.
+"""The generated parts of the chapters, and the registry: checks them, or renews them (`--write`).
 
 A generated part stands between a line `<!-- NAME -->` and a line `<!-- end -->`.
 """
@@ -33,11 +33,12 @@ from proxyimg_codec.geometry import deltas
 from proxyimg_codec.geometry import mesh as meshes
 from proxyimg_codec.image import from_bytes
 
-from . import pyramid
+from . import pyramid, registry
 from .dump import dump, values
 
 FOLDER = Path(__file__).parent
 EXAMPLE = FOLDER / "example.pxi"
+REGISTRY = FOLDER / "registry.json"
 
 FIELDS = {
     "HEAD": head.FIELDS,
@@ -189,6 +190,9 @@ PARTS: dict[str, Callable[[], Iterator[str]]] = {
     "mesh": lambda: fenced(mesh_example()),
     "mesh steps": mesh_steps,
     "scales": lambda: fenced(pyramid.scales(), "python"),
+    "levels": registry.levels_table,
+    "registry chunks": registry.chunks_table,
+    "registry numbers": registry.numbers_table,
     "models": pyramid.models,
     "registered": lambda: fenced(pyramid.registered(), "python"),
     "layout": pyramid.layout,
@@ -222,6 +226,13 @@ def wanted(name: str) -> str:
     return "".join(f"{line}\n" for line in PARTS[name]())
 
 
+def registry_text() -> str:
+    """`registry.json` as the code makes it; the ids are those of the chapters."""
+    text = "".join(path.read_text("utf-8") for path in chapters())
+    ids = re.findall(r"^\*\*\[([A-Z]{3}-\d+)\]\*\* ", text, re.M)
+    return registry.as_json(FIELDS, ids)
+
+
 def write() -> None:
     """Renews all generated parts."""
     for path in chapters():
@@ -229,6 +240,7 @@ def write() -> None:
         new = _PART.sub(lambda m: f"<!-- {m[1]} -->\n{wanted(m[1])}<!-- end -->\n", text)
         if new != text:
             path.write_text(new, "utf-8")
+    REGISTRY.write_text(registry_text(), "utf-8")
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -238,6 +250,8 @@ def main(argv: list[str] | None = None) -> int:
     if parser.parse_args(argv).write:
         write()
     stale = [name for name, text in shown().items() if text != wanted(name)]
+    if REGISTRY.read_text("utf-8") != registry_text():
+        stale.append(REGISTRY.name)
     for name in stale:
         print(f"not as the code says: {name}", file=sys.stderr)
     return 1 if stale else 0

@@ -12,7 +12,7 @@ from conformance import pyramid_views, pyramids
 from conformance.builders import Numbers
 from proxyimg_codec.cli.decode import DAMAGED
 from proxyimg_codec.container import plan
-from proxyimg_codec.container.chunks import Chunk, read, write
+from proxyimg_codec.container.chunks import MAPS_UNTIL, Chunk, read, write
 from proxyimg_codec.container.fields import unpack
 from proxyimg_codec.errors import FormatError, UnsupportedError
 from proxyimg_codec.texture import planes
@@ -178,7 +178,7 @@ def test_maps_of_earlier_versions(flat, caplog):
     at = [c.type for c in chunks].index(plan.TYPE)
     fields = unpack(plan.FIELDS, chunks[at].payload, "")
     chunks[at] = Chunk(plan.TYPE, msgpack.packb(fields))
-    data = write(chunks)
+    data = write(chunks, MAPS_UNTIL)
     image = tolerated(data[: place(data)[1] - 9], caplog)
     assert used(image) == LEVELS - 1
 

@@ -30,7 +30,9 @@ def arguments() -> argparse.ArgumentParser:
                    ".ora writes the layers, .svg their outlines; - writes PNG to standard output; "
                    "IN with the suffix .png by default")  # fmt: skip
     add = p.add_argument
-    add("--scale", type=float, help="output pixels a canvas pixel")
+    size = p.add_mutually_exclusive_group()
+    size.add_argument("--scale", type=float, help="output pixels a canvas pixel")
+    size.add_argument("--fit", type=int, metavar="N", help="reduce to at most N pixels a side")
     add("--width", type=int, help="output width; the height follows")
     add("--height", type=int, help="output height; the width follows")
     add("--region", metavar="X,Y,W,H", help="part of the canvas, in its pixels")
@@ -46,6 +48,8 @@ def arguments() -> argparse.ArgumentParser:
         "picture from the levels that can be decoded, say so, and exit with 7")  # fmt: skip
     add("--export-onnx", metavar="FILE", help="write the decoder network as ONNX; of a pyramid "
         "texture the synthesis of its colours")  # fmt: skip
+    add("--graph", choices=["network", "full"], help="what --export-onnx writes: that (default), "
+        "or the whole renderer, from points of the canvas to colour")  # fmt: skip
     add("-f", "--force", action="store_true", help="replace files that exist")
     add("--quiet", action="store_true", help="print nothing but errors")
     return p
@@ -68,6 +72,8 @@ def main(argv: list[str] | None = None) -> int:
 def decode_file(args: argparse.Namespace) -> Sequence[str]:
     """Does what the command line asks for; what was wrong with the input."""
     rendering = args.output is not None or args.export_onnx is None
+    if args.graph is not None and args.export_onnx is None:
+        raise UsageError("--graph needs --export-onnx")
     output = target(args) if rendering else ""
     kind = Path(output).suffix.lower()
     if rendering:
@@ -84,11 +90,11 @@ def decode_file(args: argparse.Namespace) -> Sequence[str]:
 
     started = time.perf_counter()
     image = open_image(args.input, tolerant=args.tolerant)
+    if args.time is not None:
+        image = image.at(args.time)
     if args.export_onnx is not None:
         export(image, args)
     if rendering:
-        if args.time is not None:
-            image = image.at(args.time)
         if kind in LAYERED:
             layered(image, output, kind, args)
         else:
@@ -105,10 +111,11 @@ def refuse_render_flags(args: argparse.Namespace) -> None:
     Raises:
         UsageError: A rendering flag was given, but nothing is rendered.
     """
-    flags = ("scale", "width", "height", "region", "time", "no_background", "bit_depth")
+    chosen = ("time", "no_background") if args.graph == "full" else ()
+    flags = ("scale", "fit", "width", "height", "region", "time", "no_background", "bit_depth")
     for name in flags:
         value = getattr(args, name)
-        if value is not None and value is not False:
+        if value is not None and value is not False and name not in chosen:
             raise UsageError(f"--{name.replace('_', '-')} needs an output picture")
     if args.engine != "auto":
         raise UsageError("--engine needs an output picture")
@@ -122,7 +129,7 @@ def refuse_for_layers(args: argparse.Namespace, kind: str) -> None:
     """
     if kind not in LAYERED:
         return
-    for name in ("scale", "width", "height", "region"):
+    for name in ("scale", "fit", "width", "height", "region"):
         if getattr(args, name) is not None:
             raise UsageError(f"--{name}: a {kind} file has the size of the canvas")
     if args.time is not None and kind == ".svg":
@@ -137,13 +144,32 @@ def target(args: argparse.Namespace) -> str:
 
 
 def export(image: Any, args: argparse.Namespace) -> None:
-    """Writes the network or the synthesis of all layers, or of those that were asked for.
+    """Writes an ONNX model of the picture.
+
+    Raises:
+        UsageError: There is no such model of it.
+    """
+    from ..files import write_atomically
+
+    if args.graph == "full":
+        from ..export import onnx_renderer
+
+        layers = [key(n) for n in args.layer] if args.layer else None
+        model = onnx_renderer.build(image, layers, not args.no_background)
+    else:
+        model = texture_model(image, args)
+    write_atomically(args.export_onnx, model.SerializeToString())
+    if not args.quiet:
+        print(f"{args.export_onnx}: ONNX opset {model.opset_import[0].version}", file=sys.stderr)
+
+
+def texture_model(image: Any, args: argparse.Namespace) -> Any:
+    """The network or the synthesis of all layers, or of those that were asked for.
 
     Raises:
         UsageError: They have several.
     """
     from ..export import onnx_network, onnx_synthesis
-    from ..files import write_atomically
 
     layers = selected(image, args.layer)
     networks = {layer.network for layer in layers} - {None}
@@ -152,10 +178,7 @@ def export(image: Any, args: argparse.Namespace) -> None:
         raise UsageError(
             "the layers have several networks or planes; choose one layer with --layer"
         )
-    model = onnx_synthesis.build(*planes) if planes else onnx_network.build(*networks)
-    write_atomically(args.export_onnx, model.SerializeToString())
-    if not args.quiet:
-        print(f"{args.export_onnx}: ONNX opset {model.opset_import[0].version}", file=sys.stderr)
+    return onnx_synthesis.build(*planes) if planes else onnx_network.build(*networks)
 
 
 def selected(image: Any, names: list[str] | None) -> list[Any]:
@@ -177,7 +200,13 @@ def render(image: Any, output: str, args: argparse.Namespace) -> None:
     from ..render.view import make_view
 
     region = parse_region(args.region)
-    view = make_view((image.width, image.height), args.width, args.height, args.scale, region)
+    scale = args.scale
+    if args.fit is not None:
+        if args.fit < 1:
+            raise UsageError(f"--fit {args.fit}: must be at least 1")
+        sides = region[2:] if region else (image.width, image.height)
+        scale = min(1.0, args.fit / max(1, *sides))
+    view = make_view((image.width, image.height), args.width, args.height, scale, region)
     bar = Bar(view.width * view.height, "rendering", args.quiet)
     dtype = {8: np.uint8, 16: np.uint16, 32: np.float32}[args.bit_depth or 8]
     try:

@@ -16,6 +16,7 @@ from typing import Any
 from ..doubts import CODES, ERROR, WARNING, Issue
 from ..errors import FormatError, InputError, LimitError, PxiError, UnsupportedError
 from ..files import read_bytes
+from ..levels import profile_and_level
 from ..validate import validate
 from .common import parser, printable, run
 
@@ -71,16 +72,20 @@ def check(args: argparse.Namespace) -> None:
 
 def report(path: str) -> dict[str, Any]:
     """What is found in a file, ready for JSON."""
+    data = b""
     try:
-        issues = validate(read_bytes(path))
+        data = read_bytes(path)
+        issues = validate(data)
     except InputError as error:
         issues = [Issue("", ERROR, str(error), exit_code=error.exit_code)]
     found = {v.exit_code for v in issues}
+    result = next(name for name, error in RESULTS.items() if not error or error.exit_code in found)
+    profile, level = profile_and_level(data) if result == "valid" else (None, None)
     return {
         "file": path,
-        "result": next(
-            name for name, error in RESULTS.items() if not error or error.exit_code in found
-        ),
+        "result": result,
+        "profile": profile,
+        "level": level,
         "issues": [{k: v for k, v in asdict(i).items() if k != "exit_code"} for i in issues],
     }
 
@@ -89,7 +94,8 @@ def text(report: dict[str, Any]) -> str:
     """The report on a file for people."""
     counts = Counter(v["severity"] for v in report["issues"])
     total = ", ".join(f"{n} {name}{'s' * (n > 1)}" for name, n in counts.items())
-    lines = [f"{report['file']}: {report['result']}{f' ({total})' * bool(total)}"]
+    fits = f", {report['profile']}, level {report['level']}" if report["level"] else ""
+    lines = [f"{report['file']}: {report['result']}{fits}{f' ({total})' * bool(total)}"]
     for v in report["issues"]:
         chunk = f"chunk {v['chunk']}" if v["chunk"] else ""
         place = " ".join(p for p in (chunk, _at(v["offset"])) if p)

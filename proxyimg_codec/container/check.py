@@ -196,8 +196,6 @@ def _check_cuts(c: Container, number: int) -> None:
     cuts = texture["cuts"]
     if not cuts:
         return
-    if texture["mask"]:
-        raise FormatError("a mask and cuts", "chunk TEXR", rule="PYR-40")
     if texture["part"][2:] != c.layers[number]["box"][2:]:
         raise FormatError(
             "a part with cuts has not the size of the box", "chunk TEXR", rule="PYR-40"

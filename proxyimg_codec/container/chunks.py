@@ -17,12 +17,14 @@ from ..errors import FormatError, UnsupportedError
 from ..limits import DEFAULT_LIMITS, Limits
 
 SIGNATURE = b"\x89PXI\r\n\x1a\n"
-VERSION = (0, 3)
+VERSION = (0, 9)
 """What is written."""
 
-READABLE = ((0, 1), (0, 2), (0, 3))
-"""What is read: 0.2 is 0.3 without pyramid textures; 0.1 is 0.2 without meshes, poses and shared
-textures."""
+READABLE = ((0, 1), (0, 2), (0, 3), VERSION)
+"""What is read; what has changed between them is in chapter 16 of the specification."""
+
+MAPS_UNTIL = (0, 3)
+"""Last version whose payloads may be maps, and whose histories are bound in another way."""
 
 PREFIX = struct.Struct("<8sBBH")
 """Signature, major version, minor version, reserved (0)."""
@@ -33,11 +35,19 @@ CHUNK_MAX = (1 << 31) - 1
 
 @dataclass(frozen=True)
 class Chunk:
-    """A chunk: four-letter type and payload; `offset` is its place in the file it was read from."""
+    """A chunk.
+
+    Attributes:
+        type: Four letters.
+        payload: What it holds.
+        offset: Its place in the file it was read from.
+        version: Of the format of that file, which says how the payload is written.
+    """
 
     type: str
     payload: bytes
     offset: int | None = None
+    version: tuple[int, int] = VERSION
 
     @property
     def critical(self) -> bool:
@@ -48,6 +58,11 @@ class Chunk:
     def safe_to_copy(self) -> bool:
         """Whether an editor that does not know the type may keep the chunk."""
         return self.type[3].islower()
+
+    @property
+    def old(self) -> bool:
+        """Whether it may hold what was given up with `MAPS_UNTIL`."""
+        return self.version <= MAPS_UNTIL
 
     @property
     def size(self) -> int:
@@ -64,7 +79,8 @@ def write(chunks: Iterable[Chunk], version: tuple[int, int] = VERSION) -> bytes:
     return b"".join(parts)
 
 
-def _check_prefix(data: bytes) -> None:
+def _version(data: bytes) -> tuple[int, int]:
+    """The version that the prefix states, which is checked."""
     if not data:
         raise FormatError("the file is empty", rule="CON-2")
     if data[: len(SIGNATURE)] != SIGNATURE[: len(data)]:
@@ -80,6 +96,7 @@ def _check_prefix(data: bytes) -> None:
         )
     if reserved:
         raise FormatError("reserved field is not zero", offset=10, rule="CON-2")
+    return major, minor
 
 
 def _valid_type(raw: bytes) -> bool:
@@ -95,7 +112,7 @@ def read(data: bytes, limits: Limits = DEFAULT_LIMITS) -> list[Chunk]:
         LimitError: Too large or too many chunks.
     """
     limits.check("file_bytes", len(data))
-    _check_prefix(data)
+    version = _version(data)
     chunks: list[Chunk] = []
     at = PREFIX.size
     while at < len(data):
@@ -117,7 +134,7 @@ def read(data: bytes, limits: Limits = DEFAULT_LIMITS) -> list[Chunk]:
             )
         if zlib.crc32(data[at:end]) != int.from_bytes(data[end : end + 4], "little"):
             raise FormatError("CRC mismatch: the file is damaged", name, at, rule="CON-6")
-        chunks.append(Chunk(raw.decode(), data[at + FRAME.size : end], at))
+        chunks.append(Chunk(raw.decode(), data[at + FRAME.size : end], at, version))
         at = end + 4
     if not chunks or chunks[-1].type != "TAIL":
         raise FormatError("truncated: the TAIL chunk is missing", offset=at, rule="CON-13")
@@ -139,7 +156,7 @@ def read_damaged(
         LimitError: Too large or too many chunks.
     """
     limits.check("file_bytes", len(data))
-    _check_prefix(data)
+    version = _version(data)
     chunks: list[Chunk] = []
     wrong: dict[int, bool] = {}
     at = PREFIX.size
@@ -152,6 +169,6 @@ def read_damaged(
         crc = int.from_bytes(data[end : end + 4], "little")
         if end + 4 > len(data) or zlib.crc32(data[at:end]) != crc:
             wrong[len(chunks)] = end + 4 > len(data)
-        chunks.append(Chunk(raw.decode(), data[at + FRAME.size : end], at))
+        chunks.append(Chunk(raw.decode(), data[at + FRAME.size : end], at, version))
         at = end + 4
     return chunks, wrong

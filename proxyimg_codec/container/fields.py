@@ -1,9 +1,9 @@
 """Declared fields of structured chunks, packed as one canonical msgpack array.
 
 Canonical: values in the declared order, shortest encodings, no floats, no extension types. A reader
-re-packs what it read and compares, so that every content has exactly one encoding as an array.
-Versions 0.1 and 0.2 wrote maps from the keys to the values, which are still read, also in later
-files. The byte tables of the specification are printed from these declarations.
+re-packs what it read and compares, so that every content has exactly one encoding. Files up to
+version 0.3 may hold maps from the keys to the values instead. The byte tables of the specification
+are printed from these declarations.
 """
 
 from __future__ import annotations
@@ -75,8 +75,10 @@ def pack(fields: tuple[Field, ...], values: Mapping[str, Any]) -> bytes:
     return packed
 
 
-def unpack(fields: tuple[Field, ...], payload: bytes, where: str) -> dict[str, Any]:
-    """The checked values of a payload, by key.
+def unpack(
+    fields: tuple[Field, ...], payload: bytes, where: str, *, old: bool = False
+) -> dict[str, Any]:
+    """The checked values of a payload, by key; those of `old` files may be a map.
 
     Raises:
         FormatError: Not msgpack, not canonical, a missing, unknown or out-of-range field.
@@ -90,7 +92,7 @@ def unpack(fields: tuple[Field, ...], payload: bytes, where: str) -> dict[str, A
         raise FormatError(
             f"payload is not valid msgpack ({type(error).__name__})", where, rule="CON-14"
         ) from None
-    values = _by_key(fields, content, where)
+    values = _by_key(fields, content, where, old)
     for field in fields:
         problem = field.problem(values[field.key])
         if problem:
@@ -100,14 +102,14 @@ def unpack(fields: tuple[Field, ...], payload: bytes, where: str) -> dict[str, A
     return values
 
 
-def _by_key(fields: tuple[Field, ...], content: Any, where: str) -> dict[str, Any]:
+def _by_key(fields: tuple[Field, ...], content: Any, where: str, old: bool) -> dict[str, Any]:
     keys = [f.key for f in fields]
-    if isinstance(content, dict) and list(content) == keys:
+    if old and isinstance(content, dict) and list(content) == keys:
         return content
     if not isinstance(content, list):
-        rule = "CON-17" if isinstance(content, dict) else "CON-14"
+        rule = "CON-17" if old and isinstance(content, dict) else "CON-14"
         expected = ", ".join(keys)
-        raise FormatError(f"payload is neither an array nor a map of {expected}", where, rule=rule)
+        raise FormatError(f"payload is not an array of {expected}", where, rule=rule)
     if len(content) != len(keys):
         counts = f"{len(content)} values instead of {len(keys)}"
         raise FormatError(f"payload has {counts}: {', '.join(keys)}", where, rule="CON-14")

@@ -120,14 +120,14 @@ def assemble(
             name = _BLOCK_NAMES[chunk.type]
             if name in blocks:
                 raise FormatError("appears twice", where, chunk.offset, rule="CON-11")
-            blocks[name] = meta.decompress(chunk.payload, where, limits)
+            blocks[name] = meta.decompress(chunk, where, limits)
         elif chunk.type in _SINGLE:
             if chunk.type in single:
                 raise FormatError("appears twice", where, chunk.offset, rule="CON-11")
             single[chunk.type] = values_of(chunk)
             if chunk.type == undo.TYPE:
                 present = [c for c in chunks if c.type not in (undo.TYPE, "TAIL")]
-                history = _renewed(undo.decode(chunk.payload, present, where, limits))
+                history = _renewed(undo.decode(chunk, present, where, limits))
         elif chunk.type in (head.TYPE, "TAIL"):
             raise FormatError("appears twice", where, chunk.offset, rule="CON-11")
         elif chunk.critical:
@@ -165,7 +165,7 @@ def values(chunk: Chunk) -> Values:
         UnsupportedError: A texture coder that is not known.
     """
     where = f"chunk {chunk.type}" + ("" if chunk.offset is None else f" at byte {chunk.offset}")
-    return unpack(fields_of(chunk), chunk.payload, where)
+    return unpack(fields_of(chunk), chunk.payload, where, old=chunk.old)
 
 
 def _renewed(steps: tuple[undo.Step, ...]) -> tuple[undo.Step, ...]:
@@ -177,8 +177,8 @@ def _renewed(steps: tuple[undo.Step, ...]) -> tuple[undo.Step, ...]:
     def renewed(chunk: Chunk) -> Chunk:
         payload = chunk.payload
         with contextlib.suppress(FormatError, UnsupportedError):
-            if payload[:1] < b"\x90" and (fields := fields_of(chunk)):
-                payload = pack(fields, unpack(fields, payload, ""))
+            if chunk.old and (fields := fields_of(chunk)):
+                payload = pack(fields, unpack(fields, payload, "", old=True))
         return Chunk(chunk.type, payload)
 
     once = {id(chunk): chunk for step in steps for chunk in step.chunks}

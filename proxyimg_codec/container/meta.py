@@ -4,6 +4,7 @@ import zstandard
 
 from ..errors import FormatError
 from ..limits import Limits
+from .chunks import Chunk
 from .fields import Field, pack, unpack
 
 BLOCKS = {"icc": "iCCp", "exif": "eXIf", "xmp": "xMPd"}
@@ -37,14 +38,14 @@ def compressed(block: bytes) -> bytes:
     return frame
 
 
-def decompress(payload: bytes, where: str, limits: Limits) -> bytes:
+def decompress(chunk: Chunk, where: str, limits: Limits) -> bytes:
     """The block of a metadata chunk, never larger than `limits.metadata_bytes`.
 
     Raises:
         FormatError: Not a zstd frame of the stated size.
         LimitError: Larger than the limit.
     """
-    values = unpack(FIELDS, payload, where)
+    values = unpack(FIELDS, chunk.payload, where, old=chunk.old)
     return decompressed(values["size"], values["zstd"], where, limits)
 
 

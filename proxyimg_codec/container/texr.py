@@ -42,8 +42,8 @@ PYRAMID_FIELDS = (
     Field("cell", "int", "Side of a cell of the mask is 2^cell samples; 0 without a mask.", 0, 6),
     Field("mask", "bin", "Coded array [1, rows, columns] of 1 bit: which cells of the part belong "
           "to the layer; empty = all."),
-    Field("cuts", "ints", "Ascending numbers of layers whose boundaries tell which samples belong "
-          "to the layer, instead of a mask: its own, and layers in front.", 0, 1 << 16),
+    Field("cuts", "ints", "Ascending numbers of layers whose boundaries take samples from the "
+          "layer: its own, and layers in front.", 0, 1 << 16),
 )  # fmt: skip
 
 CODERS = {SHARED: SHARED_FIELDS, IMPLICIT: FIELDS, PYRAMID: PYRAMID_FIELDS}

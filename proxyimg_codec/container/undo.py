@@ -15,19 +15,19 @@ import msgpack
 from ..errors import FormatError
 from ..limits import DEFAULT_LIMITS, Limits
 from . import meta
-from .chunks import Chunk, write
+from .chunks import PREFIX, SIGNATURE, Chunk, write
 from .fields import Field, pack, unpack
 
 TYPE = "uNDO"
 
 FIELDS = (
-    Field("state", "bin", "SHA-256 of the file with neither this chunk nor TAIL.", 32, 32),
+    Field("state", "bin", "SHA-256 of all chunks but this one and TAIL.", 32, 32),
     Field("size", "int", "Bytes of the history.", 1),
     Field("zstd", "bin", "The history as one zstd frame."),
 )
 
-FIRST_VERSION = (0, 2)
-"""Version of the prefix that `state` covers, whatever that of the file."""
+OLD_PREFIX = PREFIX.pack(SIGNATURE, 0, 2, 0)
+"""What `state` also covers in old files."""
 
 STEPS_MAX = 1 << 12
 """Most steps that a file keeps; earlier ones are forgotten."""
@@ -70,34 +70,33 @@ def encode(present: Sequence[Chunk], steps: Sequence[Step]) -> Chunk:
             number[key] = len(present) + len(kept)
             kept.append(list(key))
         states.insert(0, [step.operation, [number[key] for key in keys]])
-    history = msgpack.packb({"chunks": kept, "steps": states}, use_bin_type=True)
+    history = msgpack.packb([kept, states], use_bin_type=True)
     values = {"state": digest(present), "size": len(history), "zstd": meta.compressed(history)}
     return Chunk(TYPE, pack(FIELDS, values))
 
 
-def decode(
-    payload: bytes, present: Sequence[Chunk], where: str, limits: Limits
-) -> tuple[Step, ...]:
+def decode(own: Chunk, present: Sequence[Chunk], where: str, limits: Limits) -> tuple[Step, ...]:
     """Inverse of `encode`; nothing if the history belongs to another state.
 
     Raises:
         FormatError: The history is corrupt.
         LimitError: It exceeds `limits`.
     """
-    values = unpack(FIELDS, payload, where)
-    if values["state"] != digest(present):
+    values = unpack(FIELDS, own.payload, where, old=own.old)
+    if values["state"] != digest(present, own.old):
         return ()
     history = meta.decompressed(values["size"], values["zstd"], where, limits, "CHK-20")
     try:
         content = msgpack.unpackb(
             history, raw=False, strict_map_key=True, max_ext_len=0, max_array_len=1 << 20
         )
-        kept, steps = content["chunks"], content["steps"]
-        if list(content) != ["chunks", "steps"] or len(steps) > STEPS_MAX:
+        keys = list(content) if own.old else []
+        kept, steps = content.values() if own.old else content
+        if keys != ["chunks", "steps"][: len(keys)] or len(steps) > STEPS_MAX:
             raise ValueError
         limits.check("chunks", len(present) + len(kept))
         limits.check("references", sum(len(references) for _, references in steps))
-        pool = [*present, *(_chunk(type_, payload) for type_, payload in kept)]
+        pool = [*present, *(_chunk(type_, payload, own.version) for type_, payload in kept)]
         result = tuple(_step(operation, references, pool) for operation, references in steps)
         if msgpack.packb(content, use_bin_type=True) != history:
             raise ValueError
@@ -110,16 +109,17 @@ def decode(
     return result
 
 
-def digest(chunks: Sequence[Chunk]) -> bytes:
-    """What binds a history to the state it leads to, in whichever version that is written."""
-    return hashlib.sha256(write(chunks, FIRST_VERSION)).digest()
+def digest(chunks: Sequence[Chunk], old: bool = False) -> bytes:
+    """What binds a history to the state it leads to, in old files or in others."""
+    prefix = OLD_PREFIX if old else b""
+    return hashlib.sha256(prefix + write(chunks)[PREFIX.size :]).digest()
 
 
-def _chunk(type_: Any, payload: Any) -> Chunk:
+def _chunk(type_: Any, payload: Any, version: tuple[int, int]) -> Chunk:
     named = isinstance(type_, str) and len(type_) == 4 and type_.isascii() and type_.isalpha()
     if not named or not isinstance(payload, bytes):
         raise ValueError
-    return Chunk(type_, payload)
+    return Chunk(type_, payload, None, version)
 
 
 def _step(operation: Any, references: Any, pool: Sequence[Chunk]) -> Step:

@@ -5,7 +5,7 @@ A latent y has a mean m, in 1/16, and a scale index s: the density is
     7/8 Laplace(b) + 1/8 Laplace(e b),    b = exp(s / 8 - 4),
 
 the heavier second part for the errors that the context cannot foresee. Everything here is integer
-arithmetic, so that each decoder has the same tables (spec chapter 11).
+arithmetic, so that each decoder has the same tables (spec chapter 8).
 """
 
 from __future__ import annotations

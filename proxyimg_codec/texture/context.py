@@ -2,7 +2,7 @@
 
 All arithmetic is on whole numbers below 2**24, which float32 holds exactly whatever the order of
 sums, so that the matrix products of numpy may be used and every decoder finds the same
-probabilities (spec chapter 11).
+probabilities (spec chapter 8).
 """
 
 from __future__ import annotations

@@ -53,15 +53,21 @@ class Cuts:
         own: The layer's boundary, outside of which it has no samples; None cuts nothing off.
         fronts: Boundaries of layers in front of it, inside of which it has no samples.
         box: x, y, width, height of the view in canvas pixels.
+        within: The samples that a mask leaves, bool [height, width]; None = all.
     """
 
     own: Boundary | None
     fronts: tuple[Boundary, ...]
     box: Box
+    within: Samples | None = None
 
     @staticmethod
     def of(
-        numbers: Sequence[int], layer: int, boundaries: Sequence[Boundary | None], box: Box
+        numbers: Sequence[int],
+        layer: int,
+        boundaries: Sequence[Boundary | None],
+        box: Box,
+        within: Samples | None = None,
     ) -> Cuts | None:
         """The cuts by layers `numbers`, of a view that layer `layer` shows in `box`.
 
@@ -70,12 +76,13 @@ class Cuts:
             layer: Number of the layer.
             boundaries: Of all layers, back to front.
             box: Where the view lies.
+            within: The samples that a mask leaves; None = all.
         """
         if not numbers:
             return None
         fronts = (boundaries[n] for n in numbers if n > layer)
         own = boundaries[layer] if layer in numbers else None
-        return Cuts(own, tuple(b for b in fronts if b is not None), box)
+        return Cuts(own, tuple(b for b in fronts if b is not None), box, within)
 
     def numbers(self, layer: int, boundaries: Sequence[Boundary | None]) -> list[int] | None:
         """Ascending numbers for `of`; None if a boundary is not, or no longer, where it was."""
@@ -83,6 +90,16 @@ class Cuts:
         if len(found) < len({*self.fronts}) or not self._owns(boundaries[layer]):
             return None
         return sorted({*found.values(), *([] if self.own is None else [layer])})
+
+    def gone(self, layer: int, boundaries: Sequence[Boundary | None]) -> tuple[Apart, Cuts | None]:
+        """What is gone of the boundaries, and the cuts by those that are left, if any."""
+        found = self._found(layer, boundaries)
+        owns = self._owns(boundaries[layer])
+        gone = Apart(frozenset(f for f in self.fronts if f not in found), () if owns else GONE)
+        left = Cuts(
+            self.own if owns else None, tuple(f for f in self.fronts if f in found), self.box
+        )
+        return gone, left if left.own or left.fronts else None
 
     def apart(
         self,
@@ -134,13 +151,15 @@ class Cuts:
 
     @cached_property
     def shown(self) -> Samples:
-        """The samples that are taken as they are, bool [height, width]; all if none would be.
+        """The samples that are taken as they are, bool [height, width]; `within` if none would be.
 
         Those that no front covers wholly, and of which `own` covers something: all that the layer
         contributes to where nothing was moved, mixed with what is beside it or not.
         """
         shown = self._left(NOTHING)
-        return shown if shown.any() else ~shown
+        if shown.any():
+            return shown
+        return ~shown if self.within is None else self.within
 
     @cached_property
     def trusted(self) -> Samples:
@@ -169,6 +188,8 @@ class Cuts:
         """
         _, _, width, height = self.box
         left, clear = np.ones((2, height, width), np.bool_)
+        if self.within is not None:
+            left &= self.within
         for boundary in self.fronts:
             some, whole = self._covered(boundary)
             left &= ~whole

@@ -1,7 +1,7 @@
 """The registered pyramid models: weights that are part of the specification, not of a file.
 
 A model is one file of `models/`: a fixed sequence of arrays, each of whole numbers in units of a
-power of two (spec chapter 11). `Context` decides probabilities, in integers; `Synthesis` gives
+power of two (spec chapter 8). `Context` decides probabilities, in integers; `Synthesis` gives
 colour, in floating point.
 """
 

@@ -1,6 +1,6 @@
 """The pyramid texture: a view of a part of decoded planes, sampled by an interpolating kernel.
 
-Several layers may show parts of the same planes: a mask, or boundaries that cut, tell the samples
+Several layers may show parts of the same planes: a mask, and boundaries that cut, tell the samples
 that each shows. Others are filled smoothly, when they are first asked for, from those that can be
 trusted: with a mask all that are shown, with cuts those that no other layer is mixed into.
 """
@@ -45,8 +45,8 @@ class PyramidTexture:
         part: x, y, width, height in samples of what is shown, stretched over the layer's box.
         cell: A cell of `mask` has a side of 2**cell samples.
         mask: bool [rows, columns], cells from the corner of `part` whose samples are shown; None =
-            all, or what `cuts` leave.
-        cuts: What tells the samples, instead of a mask, or None.
+            all.
+        cuts: What takes samples from these, or None; it knows the mask.
         network: None: none of the file.
     """
 
@@ -79,8 +79,8 @@ class PyramidTexture:
             return b""
         return arrays.encode(self.mask[None].astype(np.int64), 1, np.ones(self.mask.shape, bool))
 
-    def masked(self, apart: Apart) -> PyramidTexture:
-        """This view with a mask instead of cuts: 2x2 samples that `Cuts.kept` all keeps."""
+    def masked(self, apart: Apart, cuts: Cuts | None = None) -> PyramidTexture:
+        """This view with a mask, of 2x2 samples that `Cuts.kept` all keeps, and with other cuts."""
         if self.cuts is None:
             return self
         kept = self.cuts.kept(apart)
@@ -91,8 +91,10 @@ class PyramidTexture:
         if not mask.any():
             mask = np.logical_or.reduce(corners)
         if mask.all():
-            return replace(self, cuts=None)
-        return replace(self, cell=1, mask=mask, cuts=None)
+            return replace(self, cell=0, mask=None, cuts=cuts)
+        if cuts is not None:
+            cuts = replace(cuts, within=_samples(mask, 1, self.part))
+        return replace(self, cell=1, mask=mask, cuts=cuts)
 
     def fields(self, numbers: Mapping[Planes, int], cuts: Sequence[int] = ()) -> dict[str, Any]:
         """The fields of TEXR, where planes have `numbers`, and `cuts` are those of layers."""
@@ -110,12 +112,13 @@ class PyramidTexture:
     @cached_property
     def shown(self) -> Samples | None:
         """The samples of the part that are taken as they are, bool [height, width]; None = all."""
-        if self.mask is None:
-            shown = None if self.cuts is None else self.cuts.shown
-            return None if shown is None or shown.all() else shown
-        _, _, width, height = self.part
-        side = 1 << self.cell
-        return self.mask.repeat(side, 0)[:height].repeat(side, 1)[:, :width]
+        if self.cuts is not None:
+            shown = self.cuts.shown
+        elif self.mask is not None:
+            shown = _samples(self.mask, self.cell, self.part)
+        else:
+            return None
+        return None if shown.all() else shown
 
     def kept(self, apart: Apart) -> Samples | None:
         """Those of `shown` that still fit once something is apart; None = all."""
@@ -221,6 +224,12 @@ class PyramidTexture:
 Texture = ImplicitTexture | PyramidTexture
 
 
+def _samples(mask: NDArray[np.bool_], cell: int, part: Box) -> Samples:
+    """The samples of a part, bool [height, width], whose cells are in a mask."""
+    _, _, width, height = part
+    return mask.repeat(1 << cell, 0)[:height].repeat(1 << cell, 1)[:, :width]
+
+
 def _interpolated(padded: Floats, first: NDArray[np.intp], fx: Floats, fy: Floats) -> Floats:
     """Colours [n, C] at fractions fx, fy [n] from the four by four samples after `first` [n]."""
     samples = padded.reshape(-1, padded.shape[2])
@@ -271,13 +280,15 @@ def unpack(
     Raises:
         FormatError: The mask is corrupt, full or empty.
     """
-    x, y, width, height = fields["part"]
+    x, y, width, height = part = fields["part"]
     mask = None
     if fields["mask"]:
         shape = texr.mask_shape(fields)
         mask = arrays.decode(fields["mask"], (1, *shape), 1, np.ones(shape, bool))[0].astype(bool)
         if mask.all() or not mask.any():
             raise FormatError("the mask of the view is full or empty", where, rule="PYR-39")
+        if cuts is not None:
+            cuts = replace(cuts, within=_samples(mask, fields["cell"], part))
     alpha = planes[fields["alpha"] - 1] if fields["alpha"] else None
     texture = PyramidTexture(
         planes[fields["planes"]], alpha, (x, y, width, height), fields["cell"], mask, cuts

@@ -36,8 +36,8 @@ def doubtful(tmp_path, plain):
 
 
 def test_valid(tool, plain):
-    assert tool("validate", plain).out.decode() == f"{plain}: valid\n"
-    assert tool("validate", "-", stdin=plain.read_bytes()).out == b"-: valid\n"
+    assert tool("validate", plain).out.decode() == f"{plain}: valid, still, level 1\n"
+    assert tool("validate", "-", stdin=plain.read_bytes()).out == b"-: valid, still, level 1\n"
 
 
 @pytest.mark.parametrize(
@@ -69,7 +69,9 @@ def test_the_worst_of_several_files_counts(tool, plain):
 
 def test_strict(tool, plain, doubtful):
     out = tool("validate", doubtful).out.decode()
-    assert out.startswith(f"{doubtful}: valid (1 warning)\n  warning VAL-1: chunk teSt at byte ")
+    assert out.startswith(
+        f"{doubtful}: valid, still, level 1 (1 warning)\n  warning VAL-1: chunk teSt at byte "
+    )
     assert "with warnings: 1 of 2" in tool("validate", doubtful, plain, "--strict", code=4).err
     tool("validate", plain, "--strict")
     old = ROOT / "tests/golden/0.2/tree.pxi"
@@ -85,6 +87,8 @@ def test_json_is_stable(tool, doubtful):
     assert warned == {
         "file": str(doubtful),
         "result": "valid",
+        "profile": "still",
+        "level": 1,
         "issues": [
             {
                 "code": "VAL-1",

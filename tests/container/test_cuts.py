@@ -21,7 +21,6 @@ CUTS = [
     (0, {"cuts": [0, 1]}, "TEXR: a layer that cuts has no boundary"),
     (2, {"part": [16, 8, 31, 32]}, "TEXR: a part with cuts has not the size of the box"),
     (2, {"part": [16, 8, 32, 31]}, "TEXR: a part with cuts has not the size of the box"),
-    (2, {"mask": b"\0"}, "TEXR: a mask and cuts"),
 ]
 
 

@@ -147,13 +147,19 @@ def test_masks_trust_nobody_where_a_boundary_was(cut):
             assert (edited.layers[layer].texture.mask != trusted).any() == (apart != own)
 
 
-def test_masks_trust_nobody_where_something_was_moved(cut):
-    """What is seen stays as it is when another layer goes."""
+def test_masks_are_of_what_is_gone_and_cuts_of_what_is_left(cut):
+    """Which is removed or moved first makes no difference: there is never a rim."""
     bar, disc = cut.layers["bar"].boundary, cut.layers["disc"].boundary
     moved = cut.layers["disc"].moved(0, -7).layers["bar"].removed()
-    expected = cut.layers["back"].texture.masked(Apart(frozenset([bar, disc]))).mask
-    np.testing.assert_array_equal(moved.layers["back"].texture.mask, expected)
+    back = moved.layers["back"].texture
+    expected = cut.layers["back"].texture.masked(Apart(frozenset([bar]))).mask
+    np.testing.assert_array_equal(back.mask, expected)
+    assert back.cuts.fronts == (disc,)
     same_when_loaded(moved)
+    removed = cut.layers["bar"].removed().layers["disc"].moved(0, -7)
+    np.testing.assert_array_equal(removed.render(), moved.render())
+    shown = removed.layers["back"].texture.kept(removed.layers["back"].apart)
+    assert not (shown & near(covered(cut, "disc"))).any()
     hidden = cut.layers["bar"].hidden().layers["disc"].with_point(0, 0, 3, 1)
     expected = cut.layers["disc"].texture.masked(Apart(behind=GONE)).mask
     np.testing.assert_array_equal(hidden.layers["disc"].texture.mask, expected)

@@ -1,4 +1,4 @@
-/** Chapter 10, "Texture points": which point of a layer at rest each sample shows. */
+/** Chapter 6, "Texture points": which point of a layer at rest each sample shows. */
 
 import { REST, identity } from "./chunks.js";
 import { within } from "./errors.js";

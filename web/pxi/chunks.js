@@ -1,4 +1,4 @@
-/** Chapter 2: the values of every chunk, and the rules between chunks. */
+/** Chapter 3: the values of every chunk, and the rules between chunks. */
 
 import { need, supported, within } from "./errors.js";
 import { Values } from "./msgpack.js";
@@ -66,14 +66,14 @@ const TEXTURES = [
   },
 ];
 
-/** A layer without POSE has this one (chapter 2). */
+/** A layer without POSE has this one (chapter 3). */
 export const REST = Object.freeze({
   matrix: [2 ** 24, 0, 0, 2 ** 24], shift: [0, 0], opacity: 65535, hidden: 0, colour: [],
   node_classes: [], node_deltas: [], place_classes: [], place_deltas: [],
 });
 
-/** Values of a payload by their keys (CON-14 to CON-18). */
-function unpack(kind, payload) {
+/** Values of a payload by their keys (CON-14 to CON-18); that of an old file may be a map. */
+function unpack({ kind, payload, old }) {
   let table = TABLES[kind];
   if (kind === "TEXR") {
     const values = new Values(payload);
@@ -85,6 +85,7 @@ function unpack(kind, payload) {
   }
   const values = new Values(payload);
   const { map, count } = values.header();
+  need(!map || old, `${kind} is a map`);
   const keys = Object.keys(table);
   need(count === keys.length, `${kind} has ${count} values instead of ${keys.length}`);
   const content = {};
@@ -99,7 +100,7 @@ function unpack(kind, payload) {
 
 /** All chunks that decide about pixels, checked: {head, layers, meshes, poses, ...}. */
 export function readFile(chunks, limits) {
-  const all = (kind) => chunks.filter((c) => c.kind === kind).map((c) => unpack(kind, c.payload));
+  const all = (kind) => chunks.filter((c) => c.kind === kind).map(unpack);
   const [head] = all("HEAD");
   within(Math.max(...head.size), limits.side, "side");
   within(head.layers, limits.layers, "layers");
@@ -179,7 +180,7 @@ function checkPlans({ plans, textures }, limits) {
     need(plan.components === 3 || plan.grey === plan.levels, "grey planes with chroma");
     need(plan.lowest.length === plan.components, "the number of lowest scales is wrong");
     need(plan.shifts.length === 2 * plan.levels, "the number of shifts is wrong");
-    const [columns, rows] = plan.size;
+    const [columns, rows] = plan.size.map((n) => Math.ceil(n / 2 ** plan.levels) * 2 ** plan.levels);
     within((samples += columns * rows), limits.samples, "samples");
     within(columns + 3 * rows, limits.wavefronts, "wavefronts");
   }
@@ -224,7 +225,6 @@ function checkView({ head, layers, plans }, { planes, alpha, part, cell, mask, c
   }
   need(mask.length || !cell, "a cell without a mask");
   if (!cuts.length) return;
-  need(!mask.length, "a mask and cuts");
   need(w === layers[k].box[2] && h === layers[k].box[3], "a part with cuts is not as its box");
   cuts.forEach((c, i) => {
     need(c >= (i ? cuts[i - 1] + 1 : k) && c < layers.length, "cuts do not ascend in front");

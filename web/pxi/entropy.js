@@ -1,4 +1,4 @@
-/** Chapter 3: rANS streams, coded arrays and signed integers. */
+/** Chapter 4: rANS streams, coded arrays and signed integers. */
 
 import { need } from "./errors.js";
 

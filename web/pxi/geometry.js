@@ -1,5 +1,5 @@
 /**
- * Chapter 4: boundaries and their coverage.
+ * Chapter 5: boundaries and their coverage.
  *
  * A path is a flat array x0, y0, x1, y1, .. of control points.
  */

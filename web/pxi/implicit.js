@@ -1,4 +1,4 @@
-/** Chapter 5: planes of codes, their diffusion, and the decoder network. */
+/** Chapter 7: planes of codes, their diffusion, and the decoder network. */
 
 import { networkSizes } from "./chunks.js";
 import { decodeArray, decodeMask } from "./entropy.js";

@@ -1,4 +1,4 @@
-/** Chapter 11 up to PYR-28: from the stream of a PLAN to its latents. All of it is exact. */
+/** Chapter 8 up to PYR-28: from the stream of a PLAN to its latents. All of it is exact. */
 
 import { Rans, decodeMask } from "./entropy.js";
 import { need } from "./errors.js";
@@ -137,7 +137,7 @@ const SQUASHED = Int32Array.from({ length: 509 }, (_, x) => squashed(x, 1));
 const logOf = (x) => LOGS[Math.min(Math.abs(x), 52)];
 const squash = (x) => (x < 0 ? -SQUASHED[Math.min(-x, 508)] : SQUASHED[Math.min(x, 508)]);
 
-/** round(x, bits) as of the beginning of chapter 11, as a function of x. */
+/** round(x, bits) as of the beginning of chapter 8, as a function of x. */
 function rounding(bits) {
   if (bits <= 0) return (x) => x * 2 ** -bits;
   const half = 1 << (bits - 1);

@@ -1,4 +1,4 @@
-/** Chapter 10, "Base" and "Refinement": the proxy nodes of a layer at rest. */
+/** Chapter 6, "Base" and "Refinement": the proxy nodes of a layer at rest. */
 
 import { decodeArray, decodeSigned } from "./entropy.js";
 import { need, within } from "./errors.js";

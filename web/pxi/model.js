@@ -1,4 +1,4 @@
-/** Chapter 11, "Model": the registered networks. */
+/** Chapter 8, "Model": the registered networks. */
 
 import { need, supported } from "./errors.js";
 

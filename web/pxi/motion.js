@@ -1,4 +1,4 @@
-/** Chapter 12: how the nodes of layers move over time. */
+/** Chapter 10: how the nodes of layers move over time. */
 
 import { decodeSigned } from "./entropy.js";
 import { need, within } from "./errors.js";

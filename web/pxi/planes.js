@@ -1,4 +1,4 @@
-/** What the networks of chapter 11 share: convolutions over rows of several planes. */
+/** What the networks of chapter 8 share: convolutions over rows of several planes. */
 
 /**
  * A 3 by 3 convolution of one row.

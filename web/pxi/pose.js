@@ -1,4 +1,4 @@
-/** Chapter 10, "Pose" and "Outline": where layers are now. Points are x, y in flat arrays. */
+/** Chapter 6, "Pose" and "Outline": where layers are now. Points are x, y in flat arrays. */
 
 import { identity } from "./chunks.js";
 import { decodeSigned } from "./entropy.js";

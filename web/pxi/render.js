@@ -1,4 +1,4 @@
-/** Chapter 6: from layers to pixels. */
+/** Chapter 9: from layers to pixels. */
 
 import { Bent, Straight } from "./chart.js";
 import { within } from "./errors.js";

@@ -1,4 +1,4 @@
-/** Chapter 11, "Synthesis": from latents to a raster of samples. */
+/** Chapter 8, "Synthesis": from latents to a raster of samples. */
 
 import { clamp } from "./integers.js";
 import { Rows, conv3, mirrored, rough } from "./planes.js";

@@ -1,4 +1,4 @@
-/** Chapter 11, "Views": the part of a raster that a layer shows, and what of it may be seen. */
+/** Chapter 8, "Views": the part of a raster that a layer shows, and what of it may be seen. */
 
 import { REST } from "./chunks.js";
 import { decodeMask } from "./entropy.js";
@@ -44,14 +44,14 @@ function masksOf(scene, n, k) {
   const { layers, textures, limits } = scene;
   const { part, mask, cell, cuts } = textures[k];
   const [, , w, h] = part;
+  const masked = new Uint8Array(w * h).fill(1);
   if (mask.length) {
     const wide = Math.ceil(w / 2 ** cell);
     const bits = decodeMask(mask, Math.ceil(h / 2 ** cell), wide);
-    const shown = new Uint8Array(w * h);
     for (let y = 0, i = 0; y < h; y++) {
-      for (let x = 0; x < w; x++, i++) shown[i] = bits[(y >> cell) * wide + (x >> cell)];
+      for (let x = 0; x < w; x++, i++) masked[i] = bits[(y >> cell) * wide + (x >> cell)];
     }
-    return { shown, trusted: shown };
+    if (!cuts.length) return { shown: masked, trusted: masked };
   }
   if (!cuts.length) return { shown: null, trusted: null };
   const covered = (c) => {
@@ -64,7 +64,7 @@ function masksOf(scene, n, k) {
   const behind = cuts[0] === k ? bareBehind(scene, n, k, covered, w * h) : null;
   const some = new Uint8Array(w * h);
   const bare = new Uint8Array(w * h);
-  const shown = new Uint8Array(w * h).fill(1);
+  let shown = masked.slice();
   for (const c of cuts) {
     const cover = covered(c);
     const all = c > k && !rest(scene, n, c);
@@ -76,8 +76,8 @@ function masksOf(scene, n, k) {
       if (c > k ? all : behind[i]) bare[i] = 1;
     }
   }
-  if (!shown.includes(1)) shown.fill(1);
-  let trusted = far(some, w, h);
+  if (!shown.includes(1)) shown = masked;
+  let trusted = far(some, w, h).map((v, i) => v & masked[i]);
   if (!trusted.includes(1)) trusted = shown;
   const clear = far(bare, w, h).map((v, i) => v & shown[i]);
   return { shown: clear.includes(1) ? clear : shown, trusted };

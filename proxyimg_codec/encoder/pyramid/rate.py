@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 TAIL_SHARE, TAIL_RATIO = 1 / 8, math.e
-"""Share and relative scale of the second Laplace distribution of the mixture; spec chapter 11."""
+"""Share and relative scale of the second Laplace distribution of the mixture; spec chapter 8."""
 
 _LEAST = 1e-6
 

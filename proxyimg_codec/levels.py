@@ -1,0 +1,82 @@
+"""What a decoder must be able to do to read a file: its profile, and its level."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field, fields
+
+from .container import motn, pose
+from .container.chunks import read
+from .container.file import assemble
+from .limits import DEFAULT_LIMITS, Limits
+from .packing import unpack
+
+PROFILES = ("still", "posed", "moving")
+"""Each has what those before it have, and: nothing; poses and node sampling; motion."""
+
+LEVELS = (
+    Limits(
+        file_bytes=1 << 24, chunks=1 << 10, side=1 << 12, layers=1 << 6, networks=1 << 2,
+        segments=1 << 12, gates=1 << 12, faces=1 << 15, codes=1 << 22, samples=1 << 22,
+        filled=1 << 23, covered=1 << 26, wavefronts=1 << 14, motion=1 << 16, parameters=1 << 16,
+        metadata_bytes=1 << 20, references=1 << 14,
+    ),
+    Limits(
+        file_bytes=1 << 27, chunks=1 << 12, side=1 << 14, layers=1 << 8, networks=1 << 4,
+        segments=1 << 14, gates=1 << 14, faces=1 << 17, codes=1 << 24, samples=1 << 24,
+        filled=1 << 25, covered=1 << 29, wavefronts=1 << 16, motion=1 << 20, parameters=1 << 20,
+        metadata_bytes=1 << 24, references=1 << 17,
+    ),
+    DEFAULT_LIMITS,
+)  # fmt: skip
+"""Level 1 is for thumbnails and pages, level 2 for photographs, level 3 is what readers accept."""
+
+COUNTED = tuple(
+    f.name for f in fields(Limits) if f.name not in ("overlap", "beyond", "output_pixels")
+)
+"""Limits that make a level: all but those of what is drawn."""
+
+
+@dataclass(frozen=True)
+class Usage(Limits):
+    """Limits which remember what was checked against them.
+
+    Attributes:
+        counted: The largest count of each limit, by its name.
+    """
+
+    counted: dict[str, int] = field(default_factory=dict)
+
+    def check(self, name: str, value: int) -> None:
+        """As `Limits.check`."""
+        super().check(name, value)
+        self.counted[name] = max(self.counted.get(name, 0), value)
+
+
+def profile_and_level(data: bytes, limits: Limits = DEFAULT_LIMITS) -> tuple[str, int | None]:
+    """The lowest profile and level, 1..3, that a file needs; None if it is above all levels.
+
+    Args:
+        data: The file.
+        limits: Bounds what is spent on it.
+
+    Raises:
+        FormatError: The file breaks the format.
+        UnsupportedError: It needs a newer reader.
+        LimitError: It exceeds `limits`.
+    """
+    usage = Usage(**asdict(limits))
+    chunks = read(data, usage)
+    content = assemble(chunks, usage)
+    for layer in unpack(content, usage).layers:
+        if layer.mesh is not None:
+            _ = layer.mesh.refined
+    types = {chunk.type for chunk in chunks}
+    posed = pose.TYPE in types or any(v["sampling"] for v in content.layers)
+    profile = PROFILES[2 if motn.TYPE in types else 1 if posed else 0]
+    counted = {name: count for name, count in usage.counted.items() if name in COUNTED}
+    levels = (
+        number
+        for number, level in enumerate(LEVELS, 1)
+        if all(count <= getattr(level, name) for name, count in counted.items())
+    )
+    return profile, next(levels, None)
