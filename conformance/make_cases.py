@@ -12,7 +12,8 @@ import json
 import os
 import shutil
 import sys
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -123,8 +124,28 @@ def write(folder: Path = FOLDER) -> None:
 
 
 def _write(folder: Path) -> None:
+    """Makes all cases, and then replaces those that differ."""
     made = build()
-    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=folder.parent, prefix="cases-") as new:
+        _make(Path(new), made)
+        for name in made:
+            if not _alike(Path(new, name), folder / name):
+                shutil.rmtree(folder / name, ignore_errors=True)
+                Path(new, name).rename(folder / name)
+    for case in folder.iterdir():
+        if case.name not in made:
+            shutil.rmtree(case)
+
+
+def _alike(one: Path, other: Path) -> bool:
+    """Whether two folders have the same files."""
+    if not other.is_dir() or {f.name for f in one.iterdir()} != {f.name for f in other.iterdir()}:
+        return False
+    return all(f.read_bytes() == (other / f.name).read_bytes() for f in one.iterdir())
+
+
+def _make(folder: Path, made: Mapping[str, tuple[bytes, Mapping[str, Any]]]) -> None:
     for name, (data, description) in made.items():
         target = folder / name
         target.mkdir(parents=True)

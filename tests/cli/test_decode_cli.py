@@ -206,6 +206,53 @@ def test_export_onnx_and_render(tool, small_pxi, tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("flags", "wanted"),
+    [
+        ((), {}),
+        (("--graph", "full", "--layer", "disc", "--time", "0.4"), {"layers": ["disc"], "t": 0.4}),
+        (("--graph", "full", "--no-background"), {"background": False}),
+    ],
+    ids=["nothing", "layer and time", "no background"],
+)
+def test_export_the_renderer(tool, moving_pxi, tmp_path, flags, wanted):
+    """What flags choose of the picture, they choose of the model."""
+    ort = pytest.importorskip("onnxruntime")
+    path = tmp_path / "a.onnx"
+    tool("decode", moving_pxi, "--export-onnx", path, "--graph", "full", *flags)
+    assert os.listdir(tmp_path) == ["a.onnx"]
+    image = pxi.open(moving_pxi)
+    centres = np.meshgrid(np.arange(image.width) + 0.5, np.arange(image.height) + 0.5)
+    inputs = {"points": np.stack(centres, 2).reshape(-1, 2), "pixel_size": np.ones(2)}
+    session = ort.InferenceSession(path.read_bytes(), providers=["CPUExecutionProvider"])
+    (colour,) = session.run(None, inputs)
+    expected = image.render(**wanted, dtype=np.float32)
+    if expected.shape[2] == 4:
+        expected[..., :3] *= expected[..., 3:]
+    found = colour.reshape(image.height, image.width, 4)[..., : expected.shape[2]]
+    np.testing.assert_allclose(found, expected, atol=1e-4)
+
+
+def test_a_picture_and_its_renderer_show_the_same_moment(tool, moving_pxi, tmp_path):
+    pytest.importorskip("onnx")
+    one, other = tmp_path / "a.onnx", tmp_path / "b.onnx"
+    flags = "--graph", "full", "--time", "0.4"
+    tool("decode", moving_pxi, "--export-onnx", one, *flags)
+    tool("decode", moving_pxi, tmp_path / "b.png", "--export-onnx", other, *flags)
+    assert one.read_bytes() == other.read_bytes()
+
+
+def test_flags_of_the_renderer(tool, small_pxi, tmp_path):
+    assert "--export-onnx" in tool("decode", small_pxi, "--graph", "full", code=2).err
+    export = "decode", small_pxi, "--export-onnx", tmp_path / "a.onnx"
+    err = tool(*export, "--graph", "network", "--no-background", code=2).err
+    assert "--no-background" in err
+    assert "--scale" in tool(*export, "--graph", "full", "--scale", "2", code=2).err
+    assert "'cat'" in tool(*export, "--graph", "full", "--layer", "cat", code=2).err
+    assert "does not move" in tool(*export, "--graph", "full", "--time", "1", code=2).err
+    assert not os.listdir(tmp_path)
+
+
+@pytest.mark.parametrize(
     "flags",
     [
         ("--scale", "0"),
