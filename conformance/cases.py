@@ -14,6 +14,12 @@ FOLDER = Path(__file__).with_name("cases")
 EXIT_CODES = {"invalid": 4, "unsupported": 5, "limit": 6}
 """Exit code of a decoder for each class of error."""
 
+PROFILES = ("still", "posed", "moving")
+"""Profiles of decoders; each can do what those before it can."""
+
+LEVELS = 1, 2, 3
+"""Levels of decoders, likewise."""
+
 
 @dataclass(frozen=True)
 class Render:
@@ -41,11 +47,14 @@ class Case:
     Attributes:
         name: Name of the folder.
         title: One sentence.
-        tests: What it is there for.
+        tests: Ids of the statements of the specification that it is there for.
         input: The `.pxi` file.
-        renders: Pictures to make, if the file is valid.
+        renders: Pictures to make, if the file is valid or may be read all the same.
         error: Class of error, one of `EXIT_CODES`, if it must be refused.
         latents: SHA-256 of the latents of its planes, in hexadecimal, if it has any.
+        profile: The lowest of `PROFILES` whose decoders it is for.
+        level: The lowest of `LEVELS` whose decoders must read it; None if it must be refused.
+        optional: Whether a decoder need not look at what is wrong with the file.
     """
 
     name: str
@@ -55,12 +64,41 @@ class Case:
     renders: tuple[Render, ...]
     error: str | None
     latents: str | None = None
+    profile: str = PROFILES[0]
+    level: int | None = None
+    optional: bool = False
+
+    @property
+    def kind(self) -> str:
+        """What it is: ``valid``, a class of error, or a class that is ``optional``."""
+        return f"{self.error or 'valid'}{', optional' if self.optional else ''}"
+
+    def concerns(self, profile: str, level: int) -> bool:
+        """Whether it is for decoders of a profile and level."""
+        capable = PROFILES.index(self.profile) <= PROFILES.index(profile)
+        return capable and (self.level or LEVELS[0]) <= level
 
 
-def load(folder: Path = FOLDER, pattern: str = "*") -> list[Case]:
-    """All cases under `folder` whose name matches the shell pattern, by name."""
+def load(
+    folder: Path = FOLDER,
+    pattern: str = "*",
+    profile: str = PROFILES[-1],
+    level: int = LEVELS[-1],
+) -> list[Case]:
+    """The cases under `folder`, by name.
+
+    Args:
+        folder: Where they are.
+        pattern: Which names they have, as in a shell.
+        profile: Of the decoder that they are for.
+        level: Of this decoder.
+
+    Raises:
+        ValueError: A `case.json` makes no sense.
+    """
     files = sorted(folder.glob("*/case.json"))
-    return [_read(f) for f in files if fnmatchcase(f.parent.name, pattern)]
+    cases = [_read(f) for f in files if fnmatchcase(f.parent.name, pattern)]
+    return [case for case in cases if case.concerns(profile, level)]
 
 
 def _read(file: Path) -> Case:
@@ -75,12 +113,20 @@ def _read(file: Path) -> Case:
         )
         for r in values.get("renders", [])
     ]
-    error = values.get("error")
-    if (error is None) == (not renders) or (error is not None and error not in EXIT_CODES):
-        raise ValueError(f"{file}: needs either renders or a known class of error")
+    error, optional = values.get("error"), values.get("optional", False)
+    if (error is not None and error not in EXIT_CODES) or (optional and error is None):
+        raise ValueError(f"{file}: {error} is not a class of error")
+    if bool(renders) == (error is not None and not optional):
+        raise ValueError(f"{file}: needs either renders or a class of error, or is optional")
+    # The root mean square cannot exceed the largest error: such a limit would test nothing.
+    if not all(0 < r.rms <= r.peak for r in renders):
+        raise ValueError(f"{file}: the tolerance of the mean error exceeds that of the largest")
+    profile, level = values["profile"], values.get("level")
+    if profile not in PROFILES or level not in ((None,) if error else LEVELS):
+        raise ValueError(f"{file}: profile {profile} and level {level} do not fit")
     return Case(
         file.parent.name, values["title"], tuple(values["tests"]), file.with_name("input.pxi"),
-        tuple(renders), error, values.get("latents"),
+        tuple(renders), error, values.get("latents"), profile, level, optional,
     )  # fmt: skip
 
 

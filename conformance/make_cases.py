@@ -7,6 +7,7 @@ plain numpy decoder, whose last bits may differ from machine to machine, and are
 from __future__ import annotations
 
 import argparse
+import contextlib
 import functools
 import json
 import os
@@ -20,7 +21,8 @@ from unittest import mock
 
 import numpy as np
 
-from proxyimg_codec import errors, kernel
+from proxyimg_codec import errors, kernel, levels
+from proxyimg_codec.container import chunks, layr, motn, pose
 from proxyimg_codec.image import from_bytes
 from proxyimg_codec.pictures import encode_png
 
@@ -39,57 +41,110 @@ from . import (
     valid,
     views,
 )
-from .builders import Numbers
-from .cases import EXIT_CODES, FOLDER
+from .builders import Numbers, values
+from .cases import EXIT_CODES, FOLDER, PROFILES
+from .invalid import Invalid
+from .registry import Valid
+from .topics import statements
 
-VALID = {
-    **valid.CASES, **views.CASES, **bent.CASES, **posed.CASES, **nodes.CASES, **pyramids.CASES,
-    **pyramid_views.CASES, **moving.CASES,
-}  # fmt: skip
-INVALID = {
-    **invalid.CASES, **invalid_posed.CASES, **invalid_pyramids.CASES, **invalid_motion.CASES,
-}  # fmt: skip
+VALID: Mapping[str, Valid] = {
+    name: case
+    for module in (valid, views, bent, posed, nodes, pyramids, pyramid_views, moving)
+    for name, case in module.CASES.items()
+}
+INVALID: Mapping[str, Invalid] = {
+    name: case
+    for module in (invalid, invalid_posed, invalid_pyramids, invalid_motion)
+    for name, case in module.CASES.items()
+}
 
 PEAK, RMS = 0.05, 0.01
 """Errors in 8-bit levels that are allowed: ten times what float32 sums in another order cost."""
 
+Made = tuple[bytes, dict[str, Any]]
+"""Input and description of a case."""
+
 
 @functools.cache
-def build() -> dict[str, tuple[bytes, dict[str, Any]]]:
-    """Input and description of every case, by name."""
-    out: dict[str, tuple[bytes, dict[str, Any]]] = {}
-    for name, case in VALID.items():
-        numbers = Numbers(name)
-        made = case.build(numbers)
-        renders = [
-            {"args": args, "expected": f"expected-{i}.png", "peak": PEAK, "rms": RMS}
-            for i, args in enumerate(case.renders, 1)
-        ]
-        description: dict[str, Any] = {
-            "title": case.title,
-            "tests": list(case.tests),
-            "provenance": {"generator": "conformance.make_cases", "seed": numbers.seed},
-            "renders": renders,
-        }
-        data = made if isinstance(made, bytes) else made.to_bytes()
-        latents = symbols.digest(data)
-        if latents:
-            description["latents"] = latents
-        out[name] = data, description
+def build() -> dict[str, Made]:
+    """All cases by name.
+
+    Raises:
+        RuntimeError: The package itself does not do with an input what the case demands.
+    """
     bases = {bad.base: bad.base() for bad in INVALID.values()}
-    for name, bad in INVALID.items():
-        error = name.split("-")[0]
-        out[name] = (
-            bad.build(bases[bad.base]),
-            {
-                "title": bad.title,
-                "tests": list(bad.tests),
-                "provenance": {"generator": "conformance.make_cases", "seed": Numbers("base").seed},
-                "error": error,
-                "exit_code": EXIT_CODES[error],
-            },
-        )
-    return out
+    return {
+        **{name: _valid(name, case) for name, case in VALID.items()},
+        **{name: _invalid(name, bad, bad.build(bases[bad.base])) for name, bad in INVALID.items()},
+    }
+
+
+def _valid(name: str, case: Valid) -> Made:
+    numbers = Numbers(name)
+    made = case.build(numbers)
+    data = made if isinstance(made, bytes) else made.to_bytes()
+    profile, level = levels.profile_and_level(data)
+    description = _described(case, numbers.seed)
+    description |= {"profile": profile, "level": level, "renders": _renders(case.renders)}
+    latents = symbols.digest(data)
+    if latents:
+        description["latents"] = latents
+    return data, description
+
+
+def _invalid(name: str, bad: Invalid, data: bytes) -> Made:
+    error = name.split("-")[0]
+    raised = _refusal(name, data)
+    if raised.exit_code != EXIT_CODES[error] or not raised.rule:
+        raise RuntimeError(f"{name}: {raised} [{raised.rule or 'no rule'}]")
+    description = _described(bad, Numbers("base").seed, raised.rule)
+    description |= {"profile": _profile(data, error), "error": error}
+    description["exit_code"] = EXIT_CODES[error]
+    if bad.optional:
+        description |= {"optional": True, "renders": _renders([{}])}
+    return data, description
+
+
+def _described(case: Valid | Invalid, seed: int, *rules: str) -> dict[str, Any]:
+    return {
+        "title": case.title,
+        "tests": statements([*case.tests, *rules]),
+        "provenance": {"generator": "conformance.make_cases", "seed": seed},
+    }
+
+
+def _renders(wanted: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    return [
+        {"args": args, "expected": f"expected-{i}.png", "peak": PEAK, "rms": RMS}
+        for i, args in enumerate(wanted, 1)
+    ]
+
+
+def _refusal(name: str, data: bytes) -> errors.PxiError:
+    """What the package says of a file that must be refused."""
+    try:
+        from_bytes(data).render()
+    except errors.PxiError as error:
+        return error
+    raise RuntimeError(f"{name}: the package accepts it")
+
+
+def _profile(data: bytes, error: str) -> str:
+    """The lowest profile whose readers find the error in a file, and not another before."""
+    if error == "unsupported":
+        return PROFILES[0]
+    found = []
+    with contextlib.suppress(errors.PxiError):
+        found = chunks.read_damaged(data)[0]
+    if any(chunk.type == motn.TYPE for chunk in found):
+        return PROFILES[2]
+    return PROFILES[any(chunk.type == pose.TYPE or _node_sampling(chunk) for chunk in found)]
+
+
+def _node_sampling(chunk: chunks.Chunk) -> bool:
+    with contextlib.suppress(errors.PxiError):
+        return chunk.type == layr.TYPE and values(chunk)["sampling"] > 0
+    return False
 
 
 def as_text(description: dict[str, Any]) -> str:
@@ -145,29 +200,19 @@ def _alike(one: Path, other: Path) -> bool:
     return all(f.read_bytes() == (other / f.name).read_bytes() for f in one.iterdir())
 
 
-def _make(folder: Path, made: Mapping[str, tuple[bytes, Mapping[str, Any]]]) -> None:
+def _make(folder: Path, made: Mapping[str, Made]) -> None:
     for name, (data, description) in made.items():
         target = folder / name
         target.mkdir(parents=True)
         (target / "input.pxi").write_bytes(data)
         (target / "case.json").write_text(as_text(description), encoding="utf-8")
-        if "error" in description:
-            _check_refusal(name, data, description["exit_code"])
         for render in description.get("renders", []):
             args = dict(render["args"])
             at = args.pop("time", None)
-            pixels = from_bytes(data).render(t=at, **args, dtype=np.uint16, engine="numpy")
+            # What is optional shows what the same file shows without its fault.
+            shown = INVALID[name].base().data if "error" in description else data
+            pixels = from_bytes(shown).render(t=at, **args, dtype=np.uint16, engine="numpy")
             (target / render["expected"]).write_bytes(encode_png(pixels))
-
-
-def _check_refusal(name: str, data: bytes, code: int) -> None:
-    try:
-        from_bytes(data).render()
-    except errors.PxiError as error:
-        if error.exit_code == code:
-            return
-        raise RuntimeError(f"{name}: {error}") from error
-    raise RuntimeError(f"{name}: the package accepts it")
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -65,21 +65,21 @@ def _at(*times: float) -> list[Args]:
 
 
 @_case("A layer that moves in a loop: within it, beyond its end and before its beginning",
-       "motion: MOT-2", "motion: MOT-6", "motion: MOT-7",
+       "MOT-2", "MOT-6", "MOT-7",
        renders=_at(0.37, 1.45, 7.000003, -0.83, 1.5))  # fmt: skip
 def _moves_loop(n: Numbers) -> Image:
     return _disc(n, LOOP)
 
 
 @_case("A layer that moves once, made by a script, and stays as it is at both ends",
-       "motion: MOT-2", "motion: MOT-6", "motion: MOT-7", "motion: MOT-10",
+       "MOT-2", "MOT-6", "MOT-7", "MOT-10",
        renders=_at(0.61, -0.5, 1.501, 9.75))  # fmt: skip
 def _moves_once(n: Numbers) -> Image:
     return _disc(n, ONCE)
 
 
 @_case("Layers on refined meshes with several shapes, around one that does not move",
-       "motion: MOT-1", "motion: MOT-3", "motion: MOT-4", "mesh: midpoints",
+       "MOT-1", "MOT-3", "MOT-4", "mesh: midpoints",
        renders=_at(0.21, 1.3))  # fmt: skip
 def _moves_layers(n: Numbers) -> Image:
     meshes = {
@@ -99,7 +99,7 @@ def _moves_layers(n: Numbers) -> Image:
 
 
 @_case("A layer that was bent and turned moves: displacements add up before the affine map",
-       "motion: MOT-8", "pose: order", renders=_at(0.7, 1.1))  # fmt: skip
+       "MOT-8", "pose: order", renders=_at(0.7, 1.1))  # fmt: skip
 def _moves_posed(n: Numbers) -> Image:
     mesh = grid_mesh((2, 1), 5, 4)
     image = on_back(n, disc(n, mesh, nodes=bend(n, mesh), opacity=60000, **TURN))
@@ -113,7 +113,7 @@ for _unit, _modes, _reach in ((0, 1, 2), (6, 5, 70)):
 
     _shapes = "One shape" if _modes == 1 else f"{_modes} shapes"
     CASES[f"moves-unit-{_unit}"] = Valid(
-        f"{_shapes} in multiples of 1/{1 << _unit} pixel", ("motion: MOT-2", "motion: MOT-7"),
+        f"{_shapes} in multiples of 1/{1 << _unit} pixel", ("MOT-2", "MOT-7"),
         _build, _at(0.37, 1.0),
     )  # fmt: skip
 
@@ -125,13 +125,13 @@ for _line in (replace(LOOP, intervals=1), replace(LOOP, intervals=2), replace(ON
     _name = f"moves-{'loop' if _line.loop else 'once'}-{_line.intervals}"
     CASES[_name] = Valid(
         f"A timeline {'in a loop' if _line.loop else 'without loop'} with few intervals: "
-        f"{_line.coefficients} coefficients", ("motion: MOT-2", "motion: MOT-7"),
+        f"{_line.coefficients} coefficients", ("MOT-2", "MOT-7"),
         _short, [WHOLE, {"time": 0.4}, {"time": 1.2}],
     )  # fmt: skip
 
 
 @_case("A back layer without boundary moves: its outline is the bent canvas",
-       "motion: MOT-8", "outline: the whole canvas", renders=[WHOLE, {"time": 0.4}])  # fmt: skip
+       "MOT-8", "outline: the whole canvas", renders=[WHOLE, {"time": 0.4}])  # fmt: skip
 def _moves_canvas(n: Numbers) -> Image:
     mesh = grid_mesh((-1, -1), 2, 2, step=(832, 640))
     image = on_back(n, disc(n))
@@ -140,7 +140,7 @@ def _moves_canvas(n: Numbers) -> Image:
     return moving(image, LOOP, {"back": track(n, mesh, LOOP, 1, 60)})
 
 
-@_case("A node is flung so far that its displacement is clamped", "motion: MOT-5", "motion: MOT-7",
+@_case("A node is flung so far that its displacement is clamped", "MOT-5", "MOT-7",
        renders=_at(0.4))  # fmt: skip
 def _moves_far(n: Numbers) -> Image:
     mesh = grid_mesh((2, 1), 5, 4)
@@ -159,7 +159,7 @@ def _moves_far(n: Numbers) -> Image:
 
 
 @_case("A layer of which no node is displaced is bent all the same: what is mixed with it does "
-       "not show", "motion: MOT-8", "pyramid: cuts", renders=[WHOLE, {"time": 0.5}])  # fmt: skip
+       "not show", "MOT-8", "pyramid: cuts", renders=[WHOLE, {"time": 0.5}])  # fmt: skip
 def _moves_nowhere(n: Numbers) -> Image:
     box, mesh = (4, 3, 16, 12), grid_mesh((2, 1), 5, 4)
     source, ring = coded(n, SIZE, levels=3), Boundary(4, (RING,))
@@ -196,12 +196,12 @@ _APART = [WHOLE, *({"time": 0.5, "layers": [v]} for v in ("disc", "bar")), {"tim
 
 
 @_case("Two layers move as one body: what they are mixed with of each other shows, but not of the "
-       "back layer", "motion: MOT-9", "pyramid: cuts", renders=_APART)  # fmt: skip
+       "back layer", "MOT-9", "pyramid: cuts", renders=_APART)  # fmt: skip
 def _moves_together(n: Numbers) -> Image:
     return _bodies(n, (7, 7))
 
 
 @_case("Two layers move alike, but as two bodies: what they are mixed with does not show",
-       "motion: MOT-9", "pyramid: cuts", renders=_APART)  # fmt: skip
+       "MOT-9", "pyramid: cuts", renders=_APART)  # fmt: skip
 def _moves_apart(n: Numbers) -> Image:
     return _bodies(n, (7, 0))

@@ -22,7 +22,7 @@ class Valid:
 
     Attributes:
         title: One sentence.
-        tests: What it is there for.
+        tests: What it is there for: topics of `topics`, or ids of statements.
         build: Makes the picture, or its file where the package would not write it so.
         renders: Arguments of each render, as in `cases.Render`.
     """
@@ -37,12 +37,12 @@ class Valids(dict[str, Valid]):
     """Valid cases by name."""
 
     def case(
-        self, title: str, *tests: str, renders: Sequence[Args] = (WHOLE,)
+        self, title: str, *tests: str, renders: Sequence[Args] = (WHOLE,), name: str = ""
     ) -> Callable[[Build], None]:
-        """Decorates a builder, whose name, with dashes, becomes that of the case."""
+        """Decorates a builder, whose name, with dashes, becomes that of the case by default."""
 
         def register(build: Build) -> None:
-            name = getattr(build, "__name__", "").strip("_").replace("_", "-")
-            self[name] = Valid(title, tests, build, renders)
+            known = name or getattr(build, "__name__", "").strip("_").replace("_", "-")
+            self[known] = Valid(title, tests, build, renders)
 
         return register

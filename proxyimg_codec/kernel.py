@@ -208,8 +208,8 @@ def blend(
 def decode(
     decoder: Decoder,
     known: NDArray[np.int16],
-    y: NDArray[np.int64],
-    x: NDArray[np.int64],
+    y: NDArray[np.int32],
+    x: NDArray[np.int32],
     bounds: NDArray[np.int64],
     alphabet: int,
     adaptation: tuple[int, int, int],
@@ -231,7 +231,7 @@ def decode(
     lib = library()
     assert lib is not None, "check available() first"
     words, states = decoder.words.astype(np.uint16), decoder.states.astype(np.uint32)
-    ys, xs = y.astype(np.int32), x.astype(np.int32)
+    ys, xs = y.astype(np.int32, copy=False), x.astype(np.int32, copy=False)
     task = Coded(
         pointer(words), len(words), pointer(states),
         decoder.lanes, known.shape[2], alphabet, known.shape[1] - 2,

@@ -28,9 +28,10 @@ COUNT_START, COUNT_STEP, COUNT_LIMIT = 8, 32, 1 << 14
 """Adaptation: initial count of a symbol, its increment, and the sum at which a row is halved."""
 
 Ints = NDArray[np.int64]
+Places = NDArray[np.int32]
 
 
-def _contexts(known: NDArray[np.int16], y: Ints, x: Ints, alphabet: int) -> NDArray[np.int16]:
+def _contexts(known: NDArray[np.int16], y: Places, x: Places, alphabet: int) -> NDArray[np.int16]:
     """Context [n, C] of positions y, x [n] from `known` [H + 1, W + 2, C], where -1 is unknown."""
     left, up = known[y + 1, x], known[y, x + 1]
     upper_left, upper_right = known[y, x], known[y, x + 2]
@@ -78,16 +79,25 @@ class _Model:
         self._counts[over] = (self._counts[over] + 1) >> 1
 
 
-def _wavefronts(stored: NDArray[np.bool_]) -> tuple[Ints, Ints, Ints]:
+def _wavefronts(stored: NDArray[np.bool_]) -> tuple[Places, Places, Ints]:
     """Stored positions y [N], x [N] in coding order, and where each wavefront starts [W + 1].
 
     y ascends within a wavefront.
     """
-    y, x = np.nonzero(stored)
-    t = x + 2 * y
-    order = np.lexsort((y, t))
-    bounds = np.flatnonzero(np.diff(t[order], prepend=-1, append=-1))
-    return y[order], x[order], bounds if len(y) else np.zeros(1, np.int64)
+    height, width = stored.shape
+    t = np.arange(0, width + 2 * height - 2, 1 if width > 1 else 2)
+    first = np.maximum((t - width + 2) // 2, 0)  # rows of wavefront t, from the first one on
+    count = np.minimum(t // 2, height - 1) + 1 - first
+    start = np.cumsum(count) - count
+    # Of all positions, as 32-bit integers: there may be many.
+    y = np.arange(stored.size, dtype=np.int32)
+    y -= np.repeat((start - first).astype(np.int32), count)
+    x = np.repeat(t.astype(np.int32), count)
+    x -= 2 * y
+    if not stored.all():
+        kept = stored[y, x]
+        y, x, count = y[kept], x[kept], np.add.reduceat(kept, start, dtype=np.int64)
+    return y, x, np.concatenate([[0], np.cumsum(count[count > 0])])
 
 
 def encode(values: NDArray[np.integer], bits: int, stored: NDArray[np.bool_]) -> bytes:

@@ -1,0 +1,118 @@
+"""The whole renderer as ONNX: points of the canvas in, colour out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..geometry.coverage import ONE
+from ..image import Image, Layer
+from .onnx_graph import Graph, Value
+from .onnx_renderer_coverage import chords, coverage
+from .onnx_renderer_texture import colour
+from .onnx_renderer_warp import locate
+
+if TYPE_CHECKING:
+    import onnx
+
+BLOCK = 1024
+"""Samples at a time: chords and faces that none of them can see are left out."""
+
+DOCUMENTATION = f"""\
+A picture as a function of the place: points of its canvas in, colours out.
+`points` float64 [N, 2], N >= 1: x and y of the centres of samples in canvas pixels. x grows to the
+right and y downwards from the upper left corner; the centre of the first pixel is (0.5, 0.5).
+`pixel_size` float64 [2]: width and height of a sample in canvas pixels. Edges are smoothed over
+that rectangle around each point.
+`colour` float32 [N, 4]: red, green, blue and alpha in 0..1, premultiplied: straight colour is that
+divided by alpha. Values are in the colour space of the picture, that of its ICC profile, or sRGB;
+they are not linear light.
+To render W by H pixels of a region of RW by RH canvas pixels whose corner is (X, Y), let a pixel
+have ceil(RW / W) by ceil(RH / H) samples, at most 64 each way. With n of them in a row of the whole
+region and m in a column, pixel_size is (RW / n, RH / m), and the points are X + (i + 0.5) RW / n,
+Y + (j + 0.5) RH / m. A pixel is the mean of the premultiplied colours of its samples.
+Curves are divided into chords for the scale that pixel_size asks for, so that they are smooth at
+any. They are rounded to 1/256 sample, beginning at the first point of a call, and so are points
+that are not whole samples away from it.
+Points should go row by row, or at least follow on points near to them: {BLOCK} are computed at a
+time, without what none of them can see. Memory is that of so many, whatever N is."""
+
+
+def build(
+    image: Image, layers: Sequence[str | int] | None = None, background: bool = True
+) -> onnx.ModelProto:
+    """The model: `points` float64 [N, 2] and `pixel_size` float64 [2] -> `colour` float32 [N, 4].
+
+    Args:
+        image: A still picture: `Image.at` gives that of a moment.
+        layers: Names or positions of what is drawn; all that are not hidden by default.
+        background: Whether to draw the back layer of an opaque picture.
+
+    Raises:
+        UsageError: An unknown layer, or none is left to draw.
+        UnsupportedError: onnx is not installed, or the model would be larger than 2 GiB.
+    """
+    chosen = image._select(layers, background)
+    graph = Graph()
+    # All that decides is in double precision, as the specification has it.
+    points = graph.input("points", np.float64, ["N", 2])
+    size = graph.input("pixel_size", np.float64, [2])
+    first = points.take(0)
+    corner = first - size / 2
+    outlines = {
+        layer: chords(graph, layer.outline, corner, size)
+        for layer in chosen
+        if layer.outline is not None
+    }
+    corners = graph.op("Round", (points - first) / size * ONE)
+    blocks, count = _blocks(points)
+
+    def block(index: Value) -> Value:
+        at, corner = points.take(index), corners.take(index)
+        result = graph.constant(np.zeros((BLOCK, 4), np.float32))
+        clear = graph.constant(np.ones((BLOCK, 1), np.float32))
+        for layer in reversed(chosen):
+            weight = clear
+            if layer in outlines:
+                covered = coverage(outlines[layer], corner).reshape(-1, 1)
+                weight = clear * covered
+            seen = _seen(layer, at, weight) * weight
+            result = result + seen
+            clear = clear - seen.take(np.array([3]), 1)
+        return result
+
+    rows = graph.scan(blocks, block).reshape(-1, 4)
+    start, axes = np.array([0]), np.array([0])
+    result = graph.op("Slice", rows, start, count, axes, name="colour")
+    said = [DOCUMENTATION, f"The canvas has {image.width} by {image.height} pixels."]
+    if image.opaque and image.layers[0] in chosen:
+        said.append("The picture is opaque: alpha is to be ignored.")
+    canvas = {"width": str(image.width), "height": str(image.height)}
+    return graph.model("proxyimg_renderer", [(result, ["N", 4])], "\n".join(said), canvas)
+
+
+def _blocks(points: Value) -> tuple[Value, Value]:
+    """Numbers of points int64 [blocks, BLOCK], and how many points there are [1].
+
+    The last point fills the last block.
+    """
+    graph = points.graph
+    count = graph.op("Shape", points, dtype=np.int64, start=0, end=1)
+    whole = (count + (BLOCK - 1)) / BLOCK * BLOCK
+    numbers = graph.op("Range", np.array(0), whole.reshape(), np.array(1), dtype=np.int64)
+    return numbers.minimum(count - 1).reshape(-1, BLOCK), count
+
+
+def _seen(layer: Layer, at: Value, weight: Value) -> Value:
+    """Colour float32 [BLOCK, 4] of a layer at points, 0 where its weight is 0."""
+    graph = at.graph
+    nothing = graph.constant(np.zeros((BLOCK, 4), np.float32))
+
+    def some() -> Value:
+        index = graph.op("NonZero", weight.reshape(-1), dtype=np.int64).reshape(-1)
+        found = colour(layer, locate(layer, at.take(index)))
+        return graph.op("ScatterND", nothing, index.reshape(-1, 1), found)
+
+    return graph.choose(weight.reduced("Max") > 0, some, lambda: nothing)
