@@ -18,7 +18,11 @@ demo: .venv/ready
 	$(BIN)/pxi-decode demo/photo.pxi demo/photo-2x.png --scale 2 --force
 	@echo "Look at demo/photo.png and demo/photo-2x.png beside $(PHOTO)."
 
-test: .venv/ready
+# A browser and a runtime for the tests of web/; without npm or a network these are skipped.
+tests/web/node_modules/ready: tests/web/package.json
+	-@command -v npm > /dev/null && timeout 300 npm install --silent --no-audit --no-fund --prefix tests/web && touch $@
+
+test: .venv/ready tests/web/node_modules/ready
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
@@ -28,4 +32,4 @@ bench: .venv/ready
 	$(BIN)/python -m benchmarks.figures $(DATA)
 
 clean:
-	rm -rf .venv demo build *.egg-info proxyimg_codec/_kernel*.so
+	rm -rf .venv tests/web/node_modules demo build *.egg-info proxyimg_codec/_kernel*.so

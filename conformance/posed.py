@@ -174,7 +174,7 @@ def _with(data: bytes, *chunks: Chunk) -> bytes:
 
 
 @_case("A tree of groups: a layer is drawn where its pose says, whatever its parents' poses",
-       "chunks: authoring data")  # fmt: skip
+       "CHK-18", "CHK-19", "MET-11", "MET-12")  # fmt: skip
 def _tree(n: Numbers) -> bytes:
     image = layered(n)
     moved = replace(image.layers[1], pose=Pose(**TURN))
@@ -188,7 +188,7 @@ def _history(state: bytes, history: bytes, size: int) -> Chunk:
     return Chunk(undo.TYPE, pack(undo.FIELDS, values))
 
 
-@_case("A history of one edit does not change the picture", "chunks: authoring data")
+@_case("A history of one edit does not change the picture", "CHK-20", "MET-13", "MET-15")
 def _undo(n: Numbers) -> bytes:
     data = layered(n).to_bytes()
     present = read(data)[:-1]
@@ -200,7 +200,7 @@ def _undo(n: Numbers) -> bytes:
     return _with(data, _history(undo.digest(present), frame, len(history)))
 
 
-@_case("A history of another picture is ignored, whatever it holds", "chunks: authoring data")
+@_case("A history of another picture is ignored, whatever it holds", "CHK-20", "MET-14")
 def _undo_stale(n: Numbers) -> bytes:
     return _with(layered(n).to_bytes(), _history(bytes(32), b"rubbish", 7))
 

@@ -258,7 +258,7 @@ def _pyramid_shared(n: Numbers) -> Image:
     return replace(made, layers=Layers([back, front, copy, other]))
 
 
-@_case("Implicit and pyramid textures in one picture", "texture: coders", "networks: several")
+@_case("Implicit and pyramid textures in one picture", "texture: coders", "pyramid: planes")
 def _pyramid_mixed(n: Numbers) -> Image:
     first, second = coded(n, (9, 8)), coded(n, (16, 12), levels=3)
     return picture(

@@ -14,7 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
 from pathlib import Path
 
-from .cases import FOLDER, Case, load
+from .cases import FOLDER, LEVELS, PROFILES, Case, load
 from .judge import Decoder, Digester, Result, judge
 from .processes import command_decoder, command_digester, expand
 
@@ -51,6 +51,18 @@ def table(results: Sequence[Result]) -> str:
     return "\n".join(lines)
 
 
+def listing(cases: Sequence[Case]) -> str:
+    """One line a case: name, profile, level, what it is, title, and the ids of its statements."""
+    width = max(len(case.name) for case in cases)
+    lines = [f"{'case':{width}} profile level  title"]
+    lines += [
+        f"{case.name:{width}} {case.profile:7} {case.level or '-':>5}  {case.title} "
+        f"({case.kind}; {', '.join(case.tests)})"
+        for case in cases
+    ]
+    return "\n".join(lines)
+
+
 def failed_cases(results: Sequence[Result]) -> list[str]:
     """Names of the cases of which at least one run failed."""
     return list(dict.fromkeys(r.case for r in results if not r.passed))
@@ -67,6 +79,11 @@ def arguments() -> argparse.ArgumentParser:
         "without --decoder")  # fmt: skip
     add("--cases", metavar="DIR", type=Path, default=FOLDER, help="folder of cases")
     add("--only", metavar="PATTERN", default="*", help="names of cases, with * and ?")
+    add("--profile", choices=PROFILES, default=PROFILES[-1],
+        help="what the decoder can do: cases up to this profile")  # fmt: skip
+    add("--level", type=int, choices=LEVELS, default=LEVELS[-1],
+        help="how much it can: cases up to this level")  # fmt: skip
+    add("--list", action="store_true", help="print the cases instead of running them")
     add("--format", choices=["png", "npy"], default="png", help="type of output to ask for")
     add("-j", "--jobs", type=int, default=os.cpu_count() or 1, help="runs at a time")
     add("--timeout", type=float, default=30, metavar="S", help="seconds a run; 30 by default")
@@ -76,14 +93,17 @@ def arguments() -> argparse.ArgumentParser:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point: 0 if all passed, 1 if anything failed."""
+    """Entry point: 0 if all passed or were listed, 1 if anything failed."""
     parser = arguments()
     args = parser.parse_args(argv)
     if args.jobs < 1 or args.timeout <= 0 or args.memory < 1:
         parser.error("--jobs, --timeout and --memory must be positive")
-    cases = load(args.cases, args.only)
+    cases = load(args.cases, args.only, args.profile, args.level)
     if not cases:
-        parser.error(f"no case in {args.cases} matches {args.only}")
+        parser.error(f"no case in {args.cases} matches")
+    if args.list:
+        print(listing(cases))
+        return 0
     template = args.decoder or OWN_DECODER
     hashing = args.latents or ("" if args.decoder else OWN_DIGESTER)
     try:

@@ -27,13 +27,15 @@ CASES = Valids()
 _case = CASES.case
 
 
-@_case("One opaque layer without boundary", "texture: bilinear", "network", "render: whole")
+@_case("One opaque layer without boundary", "file", "entropy", "coverage: none", "texture: bilinear",
+       "network", "render: whole", "MET-1")  # fmt: skip
 def _one_layer(n: Numbers) -> Image:
     back = layer("back", (0, 0, 24, 20), texture(n, grid=(6, 5)))
     return picture((24, 20), [back], network(n, octaves=2, depth=2))
 
 
-@_case("Three layers that overlap", "compositing: order", "coverage: edges", "coverage: curves")
+@_case("Three layers that overlap", "compositing: order", "boundary: coding", "coverage: edges",
+       "coverage: curves")  # fmt: skip
 def _layers(n: Numbers) -> Image:
     return layered(n)
 
@@ -112,7 +114,7 @@ def _no_back(n: Numbers) -> Image:
 
 
 @_case("Few codes stored, the others filled; steps so large that the fill's rounding shows",
-       "texture: mask", "texture: diffusion")  # fmt: skip
+       "texture: mask", "texture: diffusion", "entropy: masks")  # fmt: skip
 def _diffusion(n: Numbers) -> Image:
     sparse = n.integers(0, 5, (9, 13)) == 0
     few, one = np.zeros((14, 18), bool), np.zeros((7, 6), bool)
