@@ -55,8 +55,8 @@ CLASSES: dict[str, type[errors.PxiError]] = {
 
 SAMPLINGS = {
     0: "direct",
-    1: "local and global features at nodes",
-    2: "local features at nodes",
+    1: "local and global features",
+    2: "local features",
     3: "global features",
 }
 

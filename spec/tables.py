@@ -28,8 +28,9 @@ from proxyimg_codec.container import (
     undo,
 )
 from proxyimg_codec.container.fields import Field
+from proxyimg_codec.container.file import parse
 from proxyimg_codec.entropy import arrays
-from proxyimg_codec.geometry import deltas
+from proxyimg_codec.geometry import boundary, deltas
 from proxyimg_codec.geometry import mesh as meshes
 from proxyimg_codec.image import from_bytes
 
@@ -57,13 +58,16 @@ FIELDS = {
     "uNDO": undo.FIELDS,
 }
 
-KEYS = ("HEAD", "LAYR", "MESH", "POSE", "NETW", "PLAN")
+KEYS = ("HEAD", "LAYR", "MESH", "POSE", "NETW", "PLAN", "mOTN")
 """Chunks that the program of the chapters reads, besides TEXR."""
 
 SMALL = np.array([[[20, 21, 22, 0], [20, 21, 20, 23]]])
 SMALL_STORED = np.array([[True, True, True, False], [True, True, True, True]])
 SMALL_BITS = 5
 """The worked example of the entropy coder."""
+
+SIGNED = (0, -1, 3, -6, 20000)
+"""The worked example of signed integers."""
 
 MESH = meshes.Mesh.build(
     meshes.Base(
@@ -118,6 +122,41 @@ def small_example() -> Iterator[str]:
         cells = (str(v) if k else "." for v, k in zip(row, kept, strict=True))
         yield f"{name}  " + " ".join(c.rjust(2) for c in cells)
     yield "bytes   " + arrays.encode(SMALL, SMALL_BITS, SMALL_STORED).hex(" ")
+
+
+def signed_example() -> Iterator[str]:
+    """Lines of the worked example of signed integers."""
+    classes, raw = deltas.encode(np.array([SIGNED]))
+    sizes = [min(abs(v).bit_length(), 15) for v in SIGNED]
+    bits = "".join(f"{byte:08b}" for byte in raw)
+    pieces, at = [], 0
+    for size in sizes:
+        count = 32 if size == 15 else size
+        pieces.append(bits[at : at + count])
+        at += count
+    yield "integers   " + " ".join(map(str, SIGNED))
+    yield "classes    " + " ".join(map(str, sizes))
+    yield "           " + classes.hex(" ")
+    yield "deltas     " + raw.hex(" ")
+    yield "bits       " + " ".join(p or "-" for p in [*pieces, bits[at:]])
+
+
+def boundary_example() -> Iterator[str]:
+    """Lines of the worked example of a boundary."""
+    fields = parse(EXAMPLE.read_bytes()).layers[1]
+    count = sum(fields["segments"])
+    rows = deltas.decode(fields["classes"], fields["deltas"], 6, count, "")
+    shape = boundary.decode(fields, "")
+    assert shape is not None, "the disc has a boundary"
+    (path,) = shape.paths
+    yield f"unit       {fields['unit']}"
+    yield f"segments   {plain(fields['segments'])}"
+    yield "classes    " + fields["classes"].hex(" ")
+    yield "deltas     " + fields["deltas"].hex(" ")
+    for k, row in enumerate(rows):
+        name = f"d{'xy'[k % 2]} of 3 k" + (f" + {k // 2}" if k > 1 else "")
+        yield f"{name:14}" + " ".join(f"{v:4}" for v in row)
+    yield "points     " + " ".join(map(plain, path))
 
 
 def plain(row: object) -> str:
@@ -187,6 +226,8 @@ PARTS: dict[str, Callable[[], Iterator[str]]] = {
     **{f"fields {k}": functools.partial(fields_table, v) for k, v in FIELDS.items()},
     "keys": lambda: fenced(keys_table(), "python"),
     "example": lambda: fenced(small_example()),
+    "signed": lambda: fenced(signed_example()),
+    "boundary": lambda: fenced(boundary_example()),
     "mesh": lambda: fenced(mesh_example()),
     "mesh steps": mesh_steps,
     "scales": lambda: fenced(pyramid.scales(), "python"),

@@ -317,7 +317,7 @@ def test_program_finds_outlines(program, seed):
         shape = random_boundary(rng, int(rng.choice([100, 1 << 25])), int(rng.integers(7)))
     paths = None if shape is None else [[tuple(p) for p in path.tolist()] for path in shape.paths]
     unit = 0 if shape is None else shape.unit
-    moves = as_lists(posed.nodes)
+    moves = as_lists(None if posed.nodes is None else 64 * posed.nodes)
     got = program["outline"](
         paths, unit, size, fields_of(posed, made), moves, decoded(program, made)
     )
@@ -335,7 +335,8 @@ def test_program_finds_texture_points(program, seed):
     made = random_mesh(rng)
     posed = random_pose(rng, made, affine=seed % 3 > 0)
     fields, there = fields_of(posed, made), decoded(program, made)
-    moves, places = as_lists(posed.nodes), as_lists(posed.places)
+    moves = as_lists(None if posed.nodes is None else 64 * posed.nodes)
+    places = as_lists(posed.places)
     locate = program["chart"](fields, moves, places, there, posed.bent)
     chart = warp.Warp(posed, made, posed.bent)
     y, x = (v.ravel() for v in np.mgrid[0:12, 0:16] + 0.5)
@@ -489,94 +490,31 @@ def test_sums_of_the_context_are_exact_in_single_precision():
 CASES = [c for c in load() if not c.error]
 
 
-def displacements_by_the_letter(fields, shapes, curves, t):
-    """MOT-6 and MOT-7 in whole numbers: t in microseconds, in 1/1024 pixel for each node."""
-    duration, loop, intervals = (fields[k] for k in ("duration", "loop", "intervals"))
-    end, count = 1000 * duration, intervals if loop else intervals + 3
-    t = t % end if loop else min(max(t, 0), end)
-    i, f = divmod(1024 * t * intervals // end, 1024)
-    if t == end:
-        i, f = intervals - 1, 1024
-    g = 1024 - f
-    weights = (
-        g**3, 3 * f**3 - 6 * 1024 * f**2 + 4 * 1024**3,
-        3 * g**3 - 6 * 1024 * g**2 + 4 * 1024**3, f**3,
-    )  # fmt: skip
-    values = []
-    for c in curves:
-        taps = [c[(i + k) % count if loop else i + k] for k in range(4)]
-        total = 256 * sum(w * tap for w, tap in zip(weights, taps, strict=True))
-        values.append((total + 3 * 1024**3) // (6 * 1024**3))
-    out = []
-    for node in range(len(shapes[0])):
-        point = []
-        for axis in (0, 1):
-            total = sum(v * s[node][axis] for v, s in zip(values, shapes, strict=True))
-            moved = (2 ** (10 - fields["unit"]) * total + 2**15) >> 16
-            point.append(min(max(moved, -(1 << 30)), 1 << 30))
-        out.append(point)
-    return out
-
-
-def tracks_by_the_letter(program, fields, meshes):
-    """MOT-3 and MOT-4 with the program of the chapters: shapes and curves of each layer."""
-    modes, count = fields["modes"], fields["intervals"] + 3 * (not fields["loop"])
-    steps = program["decode_signed"](
-        fields["curve_classes"], fields["curve_deltas"], modes, len(meshes) * count
-    )
-    nodes = sum(len(m[0]) for m in meshes)
-    everywhere = program["everywhere"](modes, nodes)
-    classes = program["decode_array"](fields["shape_classes"], 2, modes, nodes, 4, everywhere)
-    raw = program["Bits"](fields["shape_deltas"])
-    residuals = {}
-    for place in sorted(classes):  # axis, shape, node
-        size = classes[place]
-        sign = -1 if size and raw.take(1) else 1
-        low = raw.take(31 if size == 15 else max(size - 1, 0))
-        residuals[place] = sign * (low if size in (0, 15) else low + (1 << (size - 1)))
-    out, first = [], 0
-    for number, (rest, ends, _) in enumerate(meshes):
-        curves = []
-        for m in range(modes):
-            row = steps[m][number * count : (number + 1) * count]
-            curves.append([sum(row[: k + 1]) for k in range(count)])
-        shapes = [[[0, 0] for _ in rest] for _ in range(modes)]
-        for (axis, m, node), residual in residuals.items():
-            node -= first
-            if 0 <= node < len(rest):
-                a, b = ends[node]
-                known = shapes[m]
-                before = known[node - 1][axis] if node else 0
-                expected = before if a == b else (known[a][axis] + known[b][axis]) >> 1
-                known[node][axis] = expected + residual
-        out.append((shapes, curves))
-        first += len(rest)
-    return out
-
-
 @pytest.mark.parametrize("case", [c for c in CASES if c.name.startswith("moves-")],
                          ids=lambda c: c.name)  # fmt: skip
-def test_motion_is_what_chapter_12_says(program, case):
+def test_program_moves_nodes(program, case):
     data = case.input.read_bytes()
     fields = file.parse(data).motion
     image = from_bytes(data)
-    moving = [image.layers[k] for k in fields["layers"]]
-    found = tracks_by_the_letter(program, fields, [decoded(program, v.mesh) for v in moving])
-    for layer, (shapes, curves) in zip(moving, found, strict=True):
-        assert shapes == layer.track.shapes.tolist()
-        assert curves == layer.track.curves.tolist()
+    meshes = {k: decoded(program, image.layers[k].mesh) for k in fields["layers"]}
+    for number, (curves, shapes) in program["decode_motion"](fields, meshes).items():
+        track = image.layers[number].track
+        assert np.array(shapes).tolist() == track.shapes.tolist()
+        assert curves == track.curves.tolist()
         for t in (0, 1, 123456, 7_000_003, 10**9 + 1, -1, -777_777, 1000 * fields["duration"]):
-            want = displacements_by_the_letter(fields, shapes, curves, t)
-            assert layer.track.at(image.timeline, t / 1e6).tolist() == want
+            found = program["displaced"](fields, curves, shapes, t)
+            assert track.at(image.timeline, t / 1e6).tolist() == [list(p) for p in found]
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda c: c.name)
 def test_program_passes_the_conformance_suite(program, case):
-    want = pixels.read(case.renders[0].expected.read_bytes()) / 257
-    args = case.renders[0].args
+    render = next((r for r in case.renders if "time" in r.args), case.renders[0])
+    want = pixels.read(render.expected.read_bytes()) / 257
+    args = render.args
     size = (want.shape[1], want.shape[0])
     data = case.input.read_bytes()
-    got = program["decode"](data, args.get("region"), size, args.get("layers"))
+    time = round(args["time"] * 1e6) if "time" in args else None
+    got = program["decode"](data, args.get("region"), size, args.get("layers"), time)
     assert close(np.array(got), want)
 
 

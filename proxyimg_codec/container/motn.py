@@ -15,12 +15,12 @@ FIELDS = (
     Field("bodies", "ints", "For each of these layers the number of the body that it moves with.",
           0, 1 << 16),
     Field("modes", "int", "Curves and shapes of each of these layers.", 1, 64),
-    Field("curve_classes", "bin", "Coded array [modes, 1, layers times coefficients] of bit "
-          "lengths of steps of the curves."),
-    Field("curve_deltas", "bin", "Raw bits of the steps."),
-    Field("shape_classes", "bin", "Coded array [2, modes, nodes of these layers] of bit lengths "
-          "of residuals of the shapes."),
-    Field("shape_deltas", "bin", "Raw bits of the residuals."),
+    Field("curve_classes", "bin", "Classes of the signed integers [modes, layers times "
+          "coefficients]: steps of the curves."),
+    Field("curve_deltas", "bin", "Raw bits of these integers."),
+    Field("shape_classes", "bin", "Classes of the signed integers [2 modes, nodes of these "
+          "layers]: residuals of the shapes."),
+    Field("shape_deltas", "bin", "Raw bits of these integers."),
     Field("size", "int", "Bytes of the script; 0 = none."),
     Field("script", "bin", "What it was made from, JSON in UTF-8, as one zstd frame."),
 )  # fmt: skip

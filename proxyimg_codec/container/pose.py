@@ -15,9 +15,9 @@ FIELDS = (
     Field("colour", "ints", "Rows of a 3 x 4 colour matrix in 2^-12; empty = none.",
           -(1 << 20), 1 << 20),
     Field("node_classes", "bin",
-          "Coded array [2, 1, nodes] of bit lengths of displacements; empty = none."),
-    Field("node_deltas", "bin", "Raw bits of the displacements."),
+          "Classes of the signed integers [2, nodes]: displacements; empty = none."),
+    Field("node_deltas", "bin", "Raw bits of these integers."),
     Field("place_classes", "bin",
-          "Coded array [2, 1, nodes] of bit lengths of texture displacements; empty = none."),
-    Field("place_deltas", "bin", "Raw bits of the texture displacements."),
+          "Classes of the signed integers [2, nodes]: texture displacements; empty = none."),
+    Field("place_deltas", "bin", "Raw bits of these integers."),
 )  # fmt: skip
