@@ -127,6 +127,22 @@ def _far(n: Numbers) -> Image:
     return on_back(n, disc(n, again, nodes=bend(n, again)))
 
 
+@_case("A mesh of two parts that lie over each other: corners that wait for no triangle have no "
+       "rank, however near they are", "mesh: connectivity", "mesh: overlap")  # fmt: skip
+def _overlaid(n: Numbers) -> Image:
+    one = grid_mesh((2, 1), 3, 2).base
+    x, y = one.vertices.astype(int).T
+    # No parallelograms, or each corner would be just where it is expected.
+    other = np.stack([x + 2 + x * y // 40, y + 1 + x * x // 80], axis=1).astype(np.uint8)
+    base = replace(
+        one,
+        vertices=np.concatenate([one.vertices, other]),
+        triangles=np.concatenate([one.triangles, one.triangles + len(one.vertices)]),
+    )
+    mesh = Mesh.build(base)
+    return on_back(n, disc(n, mesh, nodes=bend(n, mesh)))
+
+
 def _folded_mesh() -> tuple[Mesh, NDArray[np.int64]]:
     """A mesh, and displacements that push its middle over what is on its right.
 
@@ -154,6 +170,14 @@ def _folded_flipped(n: Numbers) -> Image:
     return on_back(n, disc(n, mesh, nodes=nodes, **flip))
 
 
+@_case("The same, sheared so much that it only nearly is mirrored", "mesh: folds",
+       renders=[{"region": [5, 3, 16, 12], "width": 32}])  # fmt: skip
+def _folded_sheared(n: Numbers) -> Image:
+    mesh, nodes = _folded_mesh()
+    shear = {"matrix": (UNIT, UNIT // 2, UNIT // 2, UNIT), "shift": (-4096, -5120)}
+    return on_back(n, disc(n, mesh, nodes=nodes, **shear))
+
+
 @_case("Two parts of a mesh that are pushed over each other: the first face shows",
        "mesh: overlap", renders=[WHOLE, CLOSE])  # fmt: skip
 def _overlap(n: Numbers) -> Image:
@@ -168,6 +192,13 @@ def _overlap(n: Numbers) -> Image:
 def _beyond(n: Numbers) -> Image:
     mesh = grid_mesh((9, 7), 2, 2, step=(192, 160))
     return on_back(n, disc(n, mesh, nodes=bend(n, mesh)))
+
+
+@_case("A layer so large against its mesh that weights are clamped", "pose: beyond the mesh",
+       "outline: weights")  # fmt: skip
+def _beyond_far(n: Numbers) -> Image:
+    mesh = grid_mesh((11, 8), 1, 1, step=(20, 20))
+    return on_back(n, disc(n, mesh, nodes=bend(n, mesh, 2)))
 
 
 @_case("Faces that are pressed to a line or a point hold no samples", "mesh: faces without area")

@@ -29,14 +29,22 @@ from proxyimg_codec.pictures import encode_png
 from . import (
     bent,
     invalid,
+    invalid_bombs,
+    invalid_files,
+    invalid_metadata,
     invalid_motion,
     invalid_posed,
     invalid_pyramids,
+    invalid_values,
+    metadata,
     moving,
+    networks,
     nodes,
     posed,
     pyramid_views,
     pyramids,
+    samplings,
+    sizes,
     symbols,
     valid,
     views,
@@ -49,14 +57,20 @@ from .topics import statements
 
 VALID: Mapping[str, Valid] = {
     name: case
-    for module in (valid, views, bent, posed, nodes, pyramids, pyramid_views, moving)
+    for module in (
+        valid, networks, views, sizes, metadata, bent, posed, nodes, samplings, pyramids,
+        pyramid_views, moving,
+    )
     for name, case in module.CASES.items()
-}
+}  # fmt: skip
 INVALID: Mapping[str, Invalid] = {
     name: case
-    for module in (invalid, invalid_posed, invalid_pyramids, invalid_motion)
+    for module in (
+        invalid, invalid_files, invalid_values, invalid_bombs, invalid_posed, invalid_pyramids,
+        invalid_motion, invalid_metadata,
+    )
     for name, case in module.CASES.items()
-}
+}  # fmt: skip
 
 PEAK, RMS = 0.05, 0.01
 """Errors in 8-bit levels that are allowed: ten times what float32 sums in another order cost."""

@@ -29,16 +29,16 @@ BOTH, LOCAL, GLOBAL = 1, 2, 3
 PATHS = ellipse((12, 9), (7, 5.5)), polygon((12, 7), (10, 12), (15, 10.5))
 
 
-def _sampled(n: Numbers, sampling: int, bent: bool, **pose: Any) -> Image:
+def _sampled(n: Numbers, sampling: int, bent: bool, features: int = 3, **pose: Any) -> Image:
     """A ring with a mesh on a back layer, which is sampled in the same way."""
-    dim = 6 if sampling == BOTH else 3
+    dim = 2 * features if sampling == BOTH else features
     mesh = None
     back = grid_mesh((-1, -1), 2, 2, step=(832, 640))
     if sampling != GLOBAL or bent:
         mesh = grid_mesh((2, 1), 5, 4, split=[[3, 8, 9, 21]])
     if bent and mesh is not None:
         pose |= {"nodes": bend(n, mesh), "places": bend(n, mesh, 20)}
-    planes = [texture(n, grid=(9, 8), network=1, reach=1) for _ in range(2)]
+    planes = [texture(n, dim=features, grid=(9, 8), network=1, reach=1) for _ in range(2)]
     layers = [
         layer("back", (0, 0, *SIZE), planes[0], mesh=back, sampling=sampling),
         layer("ring", (4, 3, 16, 12), planes[1], *PATHS, mesh=mesh, pose=Pose(**pose),
@@ -60,6 +60,15 @@ _case("node-global", "Node sampling with global features alone, without a mesh",
 _case("node-bent", "The same, bent and turned, with texture displacements", BOTH, True, **TURN)
 _case("node-local-turned", "Local features of a turned layer", LOCAL, False, **TURN)
 _case("node-global-bent", "Global features of a bent layer", GLOBAL, True)
+
+
+def _few(n: Numbers) -> Image:
+    return _sampled(n, BOTH, False, features=1)
+
+
+CASES["node-few"] = Valid(
+    "Node sampling with one feature, local and global", ("sampling: node",), _few, [CLOSE]
+)
 
 
 def _shared(n: Numbers) -> Image:

@@ -111,6 +111,24 @@ def _pyramid_cuts(n: Numbers) -> Image:
     return _cut(n, Pose(shift=(6 * 1024, -3 * 1024 - 511)))
 
 
+@_case("Two layers in front have equal boundaries: the one that cuts stays, the other is moved",
+       "pyramid: cuts", "pyramid: moved", renders=[{"layers": ["back"]}])  # fmt: skip
+def _pyramid_cuts_equal(n: Numbers) -> Image:
+    source, box, ring = coded(n, SIZE, levels=3), (4, 3, 16, 12), (RING,)
+    shapes = None, Boundary(4, ring), Boundary(4, ring)
+    back = view(source, cuts=Cuts.of([2], 0, shapes, (0, 0, *SIZE)))
+    front = view(source, part=box)
+    moved = Pose(shift=(6 * 1024, 2000))
+    return picture(
+        SIZE,
+        [
+            layer("back", (0, 0, *SIZE), back),
+            Layer("moved", box, shapes[1], front, pose=moved),
+            Layer("front", box, shapes[2], front),
+        ],
+    )
+
+
 @_case("Three layers of which two overlap, cut by each other", "pyramid: cuts",
        renders=[{"layers": [name]} for name in ("back", "disc", "triangle")])  # fmt: skip
 def _pyramid_cuts_several(n: Numbers) -> Image:

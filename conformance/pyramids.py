@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from functools import partial
+from unittest import mock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +16,7 @@ from numpy.typing import NDArray
 from proxyimg_codec.container import plan
 from proxyimg_codec.container.chunks import Chunk, read, write
 from proxyimg_codec.container.fields import pack, unpack
+from proxyimg_codec.entropy import rans
 from proxyimg_codec.image import Image
 from proxyimg_codec.texture import planes
 from proxyimg_codec.texture.cuts import Cuts
@@ -151,6 +154,14 @@ def _pyramid_row(n: Numbers) -> Image:
     return one(view(coded(n, (23, 1), levels=2)))
 
 
+@_case("A raster of so many samples a row that decoders may work on a few rows at a time",
+       "pyramid: size", "pyramid: support", renders=[{"region": [504, 0, 40, 18]}])  # fmt: skip
+def _pyramid_long(n: Numbers) -> Image:
+    cells = np.zeros(planes.cells_of((1040, 18), 3), bool)
+    cells[:, 63:68] = True
+    return one(view(coded(n, (1040, 18), levels=4, cells=cells)))
+
+
 @_case("Cells without latents, smaller and larger than positions of a level", "pyramid: support")
 def _pyramid_support(n: Numbers) -> Image:
     cells = n.integers(0, 2, planes.cells_of((21, 15), 2)) > 0
@@ -178,6 +189,14 @@ def _pyramid_shifts(n: Numbers) -> Image:
        "entropy: lanes")  # fmt: skip
 def _pyramid_raw_bits(n: Numbers) -> Image:
     return one(view(coded(n, (28, 22), step=0, reach=200, shifts=(7, 7, 7, 7))))
+
+
+@_case("A stream of 32 lanes: sets with more and with fewer latents, and raw bits",
+       "entropy: lanes", "pyramid: raw bits")  # fmt: skip
+def _pyramid_lanes(n: Numbers) -> Image:
+    with mock.patch.object(rans, "Encoder", partial(rans.Encoder, 5)):
+        source = coded(n, (22, 18), levels=1, step=0, reach=90, shifts=(7, 7))
+    return one(view(source))
 
 
 @_case("Latents that escape with one to three bytes", "pyramid: escapes")

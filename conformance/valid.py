@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
+from unittest import mock
 
 import numpy as np
 
 from proxyimg_codec.container.chunks import Chunk, read, write
 from proxyimg_codec.container.fields import pack
 from proxyimg_codec.container.meta import BLOCKS, FIELDS
+from proxyimg_codec.entropy import arrays, rans
 from proxyimg_codec.image import Image
 
 from .builders import (
@@ -27,8 +30,8 @@ CASES = Valids()
 _case = CASES.case
 
 
-@_case("One opaque layer without boundary", "file", "entropy", "coverage: none", "texture: bilinear",
-       "network", "render: whole", "MET-1")  # fmt: skip
+@_case("One opaque layer without boundary", "file", "entropy", "coverage: none",
+       "texture: bilinear", "network", "render: whole", "MET-1")  # fmt: skip
 def _one_layer(n: Numbers) -> Image:
     back = layer("back", (0, 0, 24, 20), texture(n, grid=(6, 5)))
     return picture((24, 20), [back], network(n, octaves=2, depth=2))
@@ -152,6 +155,14 @@ def _adaptation(n: Numbers) -> Image:
     rare = n.integers(0, 15, plane.codes.shape) == 0
     plane = replace(plane, codes=np.where(rare, plane.codes, np.int8(-1)))
     return picture((32, 24), [layer("back", (0, 0, 32, 24), plane)], network(n))
+
+
+@_case("Streams of 32 lanes: groups with more and with fewer symbols", "entropy: lanes", "entropy")
+def _lanes(n: Numbers) -> bytes:
+    back = layer("back", (0, 0, 16, 12), texture(n, dim=24, grid=(4, 3)))
+    made = picture((16, 12), [back], network(n, dim=24, octaves=0))
+    with mock.patch.object(arrays, "Encoder", partial(rans.Encoder, 5)):
+        return made.to_bytes()
 
 
 @_case("Layers with networks of different sizes", "networks: several", "network: depth and width")

@@ -33,11 +33,11 @@ from .wrong_poses import Anything, Patch
 from .wrong_pyramids import FAULTS as FAULTS_OF_PYRAMIDS
 
 
-def _ignoring_holes(paths: Any, *window: int) -> Any:
+def _ignoring_holes(paths: Any, *window: Any) -> Any:
     return np.max([coverage_of([p], *window) for p in paths], axis=0)
 
 
-def _even_odd(paths: Any, *window: int) -> Any:
+def _even_odd(paths: Any, *window: Any) -> Any:
     total = sum(coverage_of([p], *window).astype(np.int64) for p in paths)
     rest = total % (2 * coverage.FULL)
     return np.minimum(rest, 2 * coverage.FULL - rest)

@@ -2,7 +2,7 @@
 
 import zstandard
 
-from ..errors import FormatError
+from ..errors import FormatError, LimitError
 from ..limits import Limits
 from .chunks import Chunk
 from .fields import Field, pack, unpack
@@ -14,6 +14,9 @@ FIELDS = (
     Field("size", "int", "Bytes of the block.", 1),
     Field("zstd", "bin", "The block as one zstd frame."),
 )
+
+MAGIC = b"\x28\xb5\x2f\xfd"
+"""What a zstd frame begins with."""
 
 WINDOW_MAX = 1 << 27
 """Largest window of a zstd frame in bytes."""
@@ -60,7 +63,8 @@ def decompressed(
         FormatError: Not a zstd frame of that size.
         LimitError: Larger than the limit.
     """
-    limits.check("metadata_bytes", size)
+    limits.spend("metadata_bytes", size)
+    _check_window(frame, where)
     try:
         decompressor = zstandard.ZstdDecompressor(max_window_size=WINDOW_MAX)
         block: bytes = decompressor.stream_reader(frame).read(size + 1)
@@ -73,13 +77,24 @@ def decompressed(
     return block
 
 
+def _check_window(frame: bytes, where: str) -> None:
+    """Refuses a frame that states a window above `WINDOW_MAX` (RFC 8878, section 3.1.1.1.2)."""
+    if frame[:4] != MAGIC or len(frame) < 6 or frame[4] & 32:
+        return
+    exponent, eighths = divmod(frame[5], 8)
+    if (8 + eighths) << (exponent + 7) > WINDOW_MAX:
+        raise LimitError(
+            f"{where}: the zstd frame needs a window of more than {WINDOW_MAX} bytes", rule="SEC-6"
+        )
+
+
 def _frame_end(data: bytes, where: str, rule: str) -> int:
     """Length of the zstd frame that `data` starts with (RFC 8878, section 3.1.1).
 
     Raises:
         FormatError: It starts with something else, or the frame is cut.
     """
-    if data[:4] != b"\x28\xb5\x2f\xfd":
+    if data[:4] != MAGIC:
         raise FormatError("metadata is not a zstd frame", where, rule=rule)
     at = int(zstandard.frame_header_size(data))
     last = False

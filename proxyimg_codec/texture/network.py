@@ -94,6 +94,8 @@ class Network:
         """The fields of NETW: those it was read from, or coded anew."""
         return pack(self)
 
+    # Numbers may overflow [TEX-19].
+    @np.errstate(over="ignore", invalid="ignore")
     def __call__(self, features: Floats) -> Floats:
         """Outputs [N, channels] for features [N, D], not clamped.
 

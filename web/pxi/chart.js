@@ -45,6 +45,7 @@ export class Bent {
   constructor(pose, moves, places, mesh, limits) {
     const { nodes, faces } = mesh;
     this.limits = limits;
+    this.count = faces.length;
     this.beyond = 0;
     const present = moves ? nodes.map((v, i) => v + moves[i]) : nodes;
     this.present = mapped(pose, present).map((v) => v / 1024);
@@ -101,7 +102,6 @@ export class Bent {
 
   /** The face whose centroid is nearest to a point. */
   #nearest(x, y) {
-    within((this.beyond += this.faces.length), this.limits.beyond, "beyond");
     let [best, least] = [-1, Infinity];
     const p = this.present;
     this.faces.forEach(([a, b, c], index) => {
@@ -119,6 +119,8 @@ export class Bent {
     const r = this.shown;
     this.weights = new Float64Array(3 * xs.length);
     this.corners = new Uint32Array(3 * xs.length);
+    const lost = samples.reduce((sum, at) => sum + (this.faceOf[at] < 0), 0);
+    within((this.beyond += lost * this.count), this.limits.beyond, "beyond");
     for (let i = 0; i < xs.length; i++) {
       const [x, y] = [xs[i], ys[i]];
       let index = this.faceOf[samples[i]];
