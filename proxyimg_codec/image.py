@@ -19,7 +19,7 @@ from .container.check import check
 from .container.chunks import Chunk, write
 from .container.undo import Step
 from .editable import Editable
-from .errors import PxiError, UsageError
+from .errors import LimitError, PxiError, UsageError
 from .files import read_bytes, write_atomically
 from .geometry import warp
 from .geometry.boundary import Boundary
@@ -418,16 +418,21 @@ def from_bytes(data: bytes, limits: Limits = DEFAULT_LIMITS, *, tolerant: bool =
         UnsupportedError: It needs a newer reader.
         LimitError: It exceeds `limits`.
     """
-    damage: tuple[str, ...] = ()
-    if tolerant:
-        c, damage = salvage.parse(data, limits)
-        if damage:
-            logging.getLogger(__name__).warning("the file is damaged: %s", "; ".join(damage))
-    else:
-        c = container.parse(data, limits)
     from .packing import unpack
 
-    return unpack(c, limits, damage)
+    damage: tuple[str, ...] = ()
+    try:
+        if tolerant:
+            c, damage = salvage.parse(data, limits)
+        else:
+            limits = limits.budget()
+            c = container.parse(data, limits)
+        image = unpack(c, limits, damage)
+    except MemoryError:
+        raise LimitError("there is not enough memory for the file") from None
+    if damage:
+        logging.getLogger(__name__).warning("the file is damaged: %s", "; ".join(damage))
+    return image
 
 
 def open_image(

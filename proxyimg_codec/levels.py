@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field, fields
 from .container import motn, pose
 from .container.chunks import read
 from .container.file import assemble
-from .limits import DEFAULT_LIMITS, Limits
+from .limits import DEFAULT_LIMITS, Budget, Limits
 from .packing import unpack
 
 PROFILES = ("still", "posed", "moving")
@@ -17,7 +17,7 @@ LEVELS = (
     Limits(
         file_bytes=1 << 24, chunks=1 << 10, side=1 << 12, layers=1 << 6, networks=1 << 2,
         segments=1 << 12, gates=1 << 12, faces=1 << 15, codes=1 << 22, samples=1 << 22,
-        filled=1 << 23, covered=1 << 26, wavefronts=1 << 14, motion=1 << 16, parameters=1 << 16,
+        filled=1 << 23, covered=1 << 26, wavefronts=1 << 15, motion=1 << 16, parameters=1 << 16,
         metadata_bytes=1 << 20, references=1 << 14,
     ),
     Limits(
@@ -30,15 +30,14 @@ LEVELS = (
 )  # fmt: skip
 """Level 1 is for thumbnails and pages, level 2 for photographs, level 3 is what readers accept."""
 
-COUNTED = tuple(
-    f.name for f in fields(Limits) if f.name not in ("overlap", "beyond", "output_pixels")
-)
+DRAWING = ("overlap", "beyond", "output_pixels", "multiply_adds", "work")
+COUNTED = tuple(f.name for f in fields(Limits) if f.name not in DRAWING)
 """Limits that make a level: all but those of what is drawn."""
 
 
 @dataclass(frozen=True)
-class Usage(Limits):
-    """Limits which remember what was checked against them.
+class Usage(Budget):
+    """A budget which remembers what was checked against them.
 
     Attributes:
         counted: The largest count of each limit, by its name.

@@ -134,6 +134,7 @@ def unpack(c: Container, limits: Limits, damage: tuple[str, ...] = ()) -> Image:
         UnsupportedError: It needs a newer reader.
         LimitError: It exceeds `limits`.
     """
+    limits = limits.budget()
     networks = tuple(network.unpack(v, f"chunk NETW {i}") for i, v in enumerate(c.networks))
     meshes = {
         v["layer"]: Mesh({k: w for k, w in v.items() if k != "layer"}, f"chunk MESH {i}", limits)

@@ -90,12 +90,13 @@ class _Check:
             complete &= not chunk.critical
         content = None
         if complete:
-            work = partial(file.assemble, sound, self._limits, self._values_of)
+            budget = self._limits.budget()
+            work = partial(file.assemble, sound, budget, self._values_of)
             content = self._try(work)
         if content is not None:
             self._streams(content)
             if not self._failed:
-                self._try(partial(self._picture, content))
+                self._try(partial(self._picture, content, budget))
                 self.issues += doubts.old((data[8], data[9]))
             self._history(content.history)
 
@@ -148,7 +149,9 @@ class _Check:
             return work()
         except _REFUSED as error:
             self._report(error, type_, number)
-            return None
+        except MemoryError:
+            self._report(LimitError("there is not enough memory for it"), type_, number)
+        return None
 
     def _values_of(self, chunk: Chunk) -> Values:
         key = chunk.type, chunk.payload
@@ -187,10 +190,11 @@ class _Check:
 
     def _streams(self, c: Container) -> None:
         """Decodes all streams of a container."""
+        limits = self._limits.budget()
         for i, v in enumerate(c.layers):
             self._once(layr.TYPE, i, sum(v["segments"]), partial(boundary.decode, v, ""), v)
         meshes = {
-            v["layer"]: self._once(mesh.TYPE, i, v["gates"] << 6, partial(self._mesh, v), v)
+            v["layer"]: self._once(mesh.TYPE, i, v["gates"] << 6, partial(_mesh, v, limits), v)
             for i, v in enumerate(c.meshes)
         }
         for i, v in enumerate(c.poses):
@@ -218,13 +222,8 @@ class _Check:
             if all(m is not None for m in moving):
                 nodes = sum(len(m.refined.nodes) for m in moving)
                 cost = c.motion["modes"] * (len(moving) * (c.motion["intervals"] + 3) + 2 * nodes)
-                work = partial(packing.moving, c.motion, meshes, self._limits)
+                work = partial(packing.moving, c.motion, meshes, limits)
                 self._once(motn.TYPE, 0, cost, work, c.motion, *moving)
-
-    def _mesh(self, values: Values) -> Mesh:
-        own = Mesh({k: v for k, v in values.items() if k != "layer"}, "", self._limits)
-        _ = own.refined
-        return own
 
     def _textures(self, c: Container, nets: list[Any], rasters: list[Any]) -> None:
         for i, v in enumerate(c.textures):
@@ -244,9 +243,9 @@ class _Check:
             if None not in sources:
                 self._once(texr.TYPE, i, cost, work, *parts)
 
-    def _picture(self, c: Container) -> None:
-        """What it takes to show the picture, and what is odd about it."""
-        image = packing.unpack(c, self._limits)
+    def _picture(self, c: Container, budget: Limits) -> None:
+        """What it takes to show the picture, of what is left, and what is odd about it."""
+        image = packing.unpack(c, budget)
         self._limits.check("output_pixels", image.width * image.height)
         for i, layer in enumerate(image.layers):
             self._try(partial(self._drawing, image, layer), layr.TYPE, i)
@@ -280,6 +279,12 @@ class _Check:
                 self.issues.append(doubts.doubt("VAL-11", detail, *self._place(undo.TYPE, 0)))
             if len(self.issues) > found:
                 return
+
+
+def _mesh(values: Values, limits: Limits) -> Mesh:
+    own = Mesh({k: v for k, v in values.items() if k != "layer"}, "", limits)
+    _ = own.refined
+    return own
 
 
 def _planes(values: Values) -> planes.Planes:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..animate.presets import PRESETS
 from ..errors import UsageError
-from .common import EXIT_CODES, Bar, check_target, parser, run
+from .common import EXIT_CODES, Bar, add_limits, check_target, limits_of, parser, run
 from .decode import key
 
 if TYPE_CHECKING:
@@ -58,6 +58,7 @@ def arguments() -> argparse.ArgumentParser:
     add("--engine", choices=["auto", "numpy", "native", "ort"], default="auto",
         help="who runs the networks")  # fmt: skip
     add("-j", "--jobs", type=int, default=2, metavar="N", help="threads; 2 by default")
+    add_limits(p)
     add("-f", "--force", action="store_true", help="replace files that exist")
     add("--quiet", action="store_true", help="print nothing but errors")
     return p
@@ -77,7 +78,7 @@ def animate_file(args: argparse.Namespace) -> None:
     from ..image import open_image
 
     started = time.perf_counter()
-    image = open_image(args.input)
+    image = open_image(args.input, limits_of(args))
     if args.preset or args.motion:
         image = moving(image, args)
     elif image.timeline is None:

@@ -7,11 +7,13 @@ import io
 import os
 import sys
 from collections.abc import Callable
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 from .._version import __version__
 from ..errors import InputError, PxiError, UsageError
+from ..limits import Limits
 
 EXIT_CODES = """exit codes:
   0 ok, 2 usage, 3 input or output, 4 invalid file, 5 unsupported, 6 limit exceeded, 130 interrupted
@@ -26,6 +28,32 @@ def parser(prog: str, description: str) -> argparse.ArgumentParser:
     )  # fmt: skip
     p.add_argument("--version", action="version", version=f"{prog} {__version__}")
     return p
+
+
+def add_limits(p: argparse.ArgumentParser) -> None:
+    """Adds the option of all tools that read `.pxi` files."""
+    p.add_argument(
+        "--limit", metavar="NAME=VALUE", action="append", default=[],
+        help="change a limit on what files may ask for, such as layers=2000; may be repeated",
+    )  # fmt: skip
+
+
+def limits_of(args: argparse.Namespace) -> Limits:
+    """The limits that the options ask for.
+
+    Raises:
+        UsageError: A limit that does not exist, or is not a whole number.
+    """
+    names = [f.name for f in fields(Limits)]
+    changes = {}
+    for text in args.limit:
+        name, _, value = text.partition("=")
+        if name not in names:
+            raise UsageError(f"--limit {text}: there are {', '.join(names)}")
+        if not (value.isascii() and value.isdecimal() and len(value) < 20):
+            raise UsageError(f"--limit {text}: {name} must be a whole number of at most 19 digits")
+        changes[name] = int(value)
+    return Limits(**changes)
 
 
 def run(prog: str, work: Callable[[], None]) -> int:

@@ -12,7 +12,16 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import UsageError
-from .common import EXIT_CODES, Bar, check_target, default_target, parser, run
+from .common import (
+    EXIT_CODES,
+    Bar,
+    add_limits,
+    check_target,
+    default_target,
+    limits_of,
+    parser,
+    run,
+)  # fmt: skip
 
 LAYERED = (".ora", ".svg")
 """Suffixes of files that hold layers, not one picture."""
@@ -50,6 +59,7 @@ def arguments() -> argparse.ArgumentParser:
         "texture the synthesis of its colours")  # fmt: skip
     add("--graph", choices=["network", "full"], help="what --export-onnx writes: that (default), "
         "or the whole renderer, from points of the canvas to colour")  # fmt: skip
+    add_limits(p)
     add("-f", "--force", action="store_true", help="replace files that exist")
     add("--quiet", action="store_true", help="print nothing but errors")
     return p
@@ -89,7 +99,7 @@ def decode_file(args: argparse.Namespace) -> Sequence[str]:
     from ..image import open_image
 
     started = time.perf_counter()
-    image = open_image(args.input, tolerant=args.tolerant)
+    image = open_image(args.input, limits_of(args), tolerant=args.tolerant)
     if args.time is not None:
         image = image.at(args.time)
     if args.export_onnx is not None:
@@ -218,6 +228,7 @@ def render(image: Any, output: str, args: argparse.Namespace) -> None:
             background=not args.no_background,
             dtype=dtype,
             engine=args.engine,
+            limits=limits_of(args),
             progress=bar.advance,
         )
     finally:
@@ -241,7 +252,8 @@ def layered(image: Any, output: str, kind: str, args: argparse.Namespace) -> Non
     bar = Bar(len(selected(image, args.layer)), "layers", args.quiet)
     try:
         dtype = "uint16" if args.bit_depth == 16 else "uint8"
-        data = build_ora(image, **wanted, dtype=dtype, progress=bar.advance)
+        limits = limits_of(args)
+        data = build_ora(image, **wanted, dtype=dtype, limits=limits, progress=bar.advance)
     finally:
         bar.close()
     write_atomically(output, data)

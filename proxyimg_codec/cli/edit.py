@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import UsageError
-from .common import check_target, parser, printable, run
+from .common import add_limits, check_target, limits_of, parser, printable, run
 from .decode import key
 
 Values = dict[str, Any]
@@ -76,6 +76,7 @@ def arguments() -> argparse.ArgumentParser:
     add("--undo", _undo, "N", help="take back the last N edits")
     p.add_argument("--bake", action="store_true", help="forget the history of edits")
     p.add_argument("--list", action="store_true", help="print layers, groups and history")
+    add_limits(p)
     p.add_argument("-f", "--force", action="store_true", help="replace OUT if it exists")
     p.add_argument("--quiet", action="store_true", help="print nothing but errors")
     p.add_argument("--json", action="store_true", help="print the list or report as JSON")
@@ -109,7 +110,7 @@ def edit_file(args: argparse.Namespace) -> None:
     from ..image import open_image
 
     started = time.perf_counter()
-    image, number = open_image(args.input), 1
+    image, number = open_image(args.input, limits_of(args)), 1
     for values in operations:
         if "undo" in values:
             image = image.undone(values["undo"])

@@ -12,7 +12,7 @@ from ..container import texr
 from ..container.chunks import VERSION
 from ..container.file import Container, parse
 from ..files import read_bytes
-from .common import parser, printable, run
+from .common import add_limits, limits_of, parser, printable, run
 
 CODERS = {texr.IMPLICIT: "implicit", texr.PYRAMID: "pyramid"}
 VIEWED = ("grid", "bits", "network", "planes", "part", "cuts")
@@ -25,6 +25,7 @@ def arguments() -> argparse.ArgumentParser:
     """The command line."""
     p = parser("pxi-info", "Describe a .pxi file.")
     p.add_argument("input", metavar="IN", help=".pxi file, or - for standard input")
+    add_limits(p)
     p.add_argument("--json", action="store_true", help="print JSON")
     return p
 
@@ -37,8 +38,9 @@ def main(argv: list[str] | None = None) -> int:
 
 def show(args: argparse.Namespace) -> None:
     """Prints the description."""
+    limits = limits_of(args)
     data = read_bytes(args.input)
-    facts = describe(parse(data), len(data))
+    facts = describe(parse(data, limits), len(data))
     print(json.dumps(facts, indent=2) if args.json else text(facts))
 
 

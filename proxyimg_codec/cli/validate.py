@@ -17,8 +17,9 @@ from ..doubts import CODES, ERROR, WARNING, Issue
 from ..errors import FormatError, InputError, LimitError, PxiError, UnsupportedError
 from ..files import read_bytes
 from ..levels import profile_and_level
+from ..limits import Limits
 from ..validate import validate
-from .common import parser, printable, run
+from .common import add_limits, limits_of, parser, printable, run
 
 RESULTS: dict[str, type[PxiError] | None] = {
     "invalid": FormatError,
@@ -39,6 +40,7 @@ def arguments() -> argparse.ArgumentParser:
     p = parser("pxi-validate", "Check .pxi files completely.")
     p.epilog = f"{p.epilog}{EPILOG}"
     p.add_argument("input", metavar="IN", nargs="+", help=".pxi file, or - for standard input")
+    add_limits(p)
     p.add_argument("--json", action="store_true", help="print JSON")
     p.add_argument("--strict", action="store_true", help="warnings count as errors: exit code 4")
     return p
@@ -56,7 +58,8 @@ def check(args: argparse.Namespace) -> None:
     Raises:
         PxiError: A file is not valid, in the class of the worst; or, if asked for, has warnings.
     """
-    reports = [report(path) for path in args.input]
+    limits = limits_of(args)
+    reports = [report(path, limits) for path in args.input]
     if args.json:
         print(json.dumps({"files": reports}, indent=2))
     else:
@@ -70,17 +73,17 @@ def check(args: argparse.Namespace) -> None:
         raise FormatError(f"valid, but with warnings: {doubtful} of {len(reports)}")
 
 
-def report(path: str) -> dict[str, Any]:
+def report(path: str, limits: Limits) -> dict[str, Any]:
     """What is found in a file, ready for JSON."""
     data = b""
     try:
         data = read_bytes(path)
-        issues = validate(data)
+        issues = validate(data, limits)
     except InputError as error:
         issues = [Issue("", ERROR, str(error), exit_code=error.exit_code)]
     found = {v.exit_code for v in issues}
     result = next(name for name, error in RESULTS.items() if not error or error.exit_code in found)
-    profile, level = profile_and_level(data) if result == "valid" else (None, None)
+    profile, level = profile_and_level(data, limits) if result == "valid" else (None, None)
     return {
         "file": path,
         "result": result,

@@ -21,6 +21,7 @@ def check(c: Container, limits: Limits) -> None:
         UnsupportedError: They need a newer reader.
         LimitError: They exceed `limits`.
     """
+    limits = limits.budget()
     for name in ("layers", "networks"):
         limits.check(name, c.head[name])
     limits.check("side", max(c.head["size"]))
@@ -40,14 +41,20 @@ def check(c: Container, limits: Limits) -> None:
         raise FormatError(
             "the number of areas is not that of the layers", "chunk iNFO", rule="CHK-17"
         )
-    limits.check("segments", sum(sum(layer["segments"]) for layer in c.layers))
-    limits.check("gates", sum(values["gates"] for values in c.meshes))
+    limits.check("metadata_bytes", decompressed(c))
+    limits.spend("segments", sum(sum(layer["segments"]) for layer in c.layers))
+    limits.spend("gates", sum(values["gates"] for values in c.meshes))
     _check_layers(c)
     _check_tree(c)
     _check_motion(c, limits)
     _check_networks(c, limits)
     _check_planes(c, limits)
     _check_textures(c, limits)
+
+
+def decompressed(c: Container) -> int:
+    """Bytes of the metadata and the script."""
+    return sum(map(len, c.blocks.values())) + (c.motion["size"] if c.motion else 0)
 
 
 def _check_motion(c: Container, limits: Limits) -> None:
@@ -70,33 +77,28 @@ def _check_motion(c: Container, limits: Limits) -> None:
         raise FormatError("the back layer of an opaque file moves", "chunk mOTN", rule="MOT-1")
     if bool(c.motion["size"]) != bool(c.motion["script"]):
         raise FormatError("the script and its size do not fit", "chunk mOTN", rule="MOT-1")
-    limits.check("metadata_bytes", c.motion["size"])
-    # What nodes cost is checked once the meshes are decoded.
+    # It is spent once the meshes are decoded, with what nodes cost.
     coefficients = len(numbers) * (c.motion["intervals"] + (0 if c.motion["loop"] else 3))
     limits.check("wavefronts", coefficients + 2)
     limits.check("motion", c.motion["modes"] * coefficients)
 
 
 def _check_networks(c: Container, limits: Limits) -> None:
-    parameters = 0
     for net in c.networks:
         if net["channels"] > c.head["channels"]:
             raise FormatError("more channels than HEAD has", "chunk NETW", rule="CHK-12")
         width = net["hidden"]
         encoded = net["dim"] * (2 * net["octaves"] + 1)
-        parameters += (encoded + 1) * width + (net["depth"] - 1) * (width + 1) * width
-        parameters += (width + 1) * net["channels"]
-    limits.check("parameters", parameters)
+        parameters = (encoded + 1) * width + (net["depth"] - 1) * (width + 1) * width
+        limits.spend("parameters", parameters + (width + 1) * net["channels"])
 
 
 def _check_planes(c: Container, limits: Limits) -> None:
     """Checks PLAN, and that textures use all of them, in their order."""
-    samples = 0
     for planes in c.planes:
         columns, rows = (-(-n >> planes["levels"]) << planes["levels"] for n in planes["size"])
-        limits.check("wavefronts", columns + 3 * rows)
-        samples += columns * rows
-    limits.check("samples", samples)
+        limits.spend("wavefronts", columns + 3 * rows)
+        limits.spend("samples", columns * rows)
     used = 0
     for texture in c.textures:
         if texture["coder"] != texr.PYRAMID:
@@ -114,7 +116,6 @@ def _check_planes(c: Container, limits: Limits) -> None:
 
 
 def _check_textures(c: Container, limits: Limits) -> None:
-    codes = filled = covered = 0
     for i, (layer, own) in enumerate(zip(c.layers, c.textures, strict=True)):
         if min(layer["box"][2:]) < 1:
             raise FormatError("the box is empty", "chunk LAYR", rule="CHK-6")
@@ -141,17 +142,16 @@ def _check_textures(c: Container, limits: Limits) -> None:
         if pyramid:
             _check_cuts(c, i)
             area = own["part"][2] * own["part"][3]
-            filled += area if own["mask"] or own["cuts"] else 0
+            if own["mask"] or own["cuts"]:
+                limits.spend("filled", area)
             # A layer that cuts itself may also lose what those behind it touch.
-            covered += area * (len(own["cuts"]) + (i if i in own["cuts"] else 0))
+            limits.spend("covered", area * (len(own["cuts"]) + (i if i in own["cuts"] else 0)))
             if not own["mask"]:
                 continue
         rows, columns = texr.mask_shape(own) if pyramid else own["grid"][::-1]
-        limits.check("wavefronts", columns + 2 * rows)
-        codes += columns * rows * (1 if pyramid else c.networks[own["network"]]["dim"])
-    limits.check("codes", codes)
-    limits.check("filled", filled)
-    limits.check("covered", covered)
+        limits.spend("wavefronts", columns + 2 * rows)
+        dim = 1 if pyramid else c.networks[own["network"]]["dim"]
+        limits.spend("codes", columns * rows * dim)
 
 
 def _check_implicit(c: Container, layer: Values, texture: Values) -> int:

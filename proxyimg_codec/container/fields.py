@@ -61,6 +61,27 @@ class Field:
         return None
 
 
+class Few:
+    """A hook of msgpack that refuses many arrays and maps, or many items: each takes much memory.
+
+    Args:
+        containers: How many arrays and maps there may be.
+        items: How many items they may have together.
+        refusal: What is raised if there are more.
+    """
+
+    def __init__(self, containers: int, items: int, refusal: Exception) -> None:
+        self._containers, self._items, self._refusal = containers, items, refusal
+
+    def __call__(self, found: Any) -> Any:
+        """Counts an array or map."""
+        self._containers -= 1
+        self._items -= len(found)
+        if self._containers < 0 or self._items < 0:
+            raise self._refusal
+        return found
+
+
 def pack(fields: tuple[Field, ...], values: Mapping[str, Any]) -> bytes:
     """Packs `values`, which must be valid, in declared order.
 
@@ -84,9 +105,10 @@ def unpack(
         FormatError: Not msgpack, not canonical, a missing, unknown or out-of-range field.
     """
     try:
+        few = Few(1 + len(fields), 1 << 20, ValueError())
         content = msgpack.unpackb(
             payload, raw=False, strict_map_key=True, max_ext_len=0, max_map_len=64,
-            max_array_len=1 << 20,
+            max_array_len=1 << 20, list_hook=few, object_hook=few,
         )  # fmt: skip
     except (ValueError, TypeError, RecursionError, msgpack.UnpackException) as error:
         raise FormatError(

@@ -75,6 +75,7 @@ def parse(data: bytes, limits: Limits = DEFAULT_LIMITS) -> Container:
         UnsupportedError: It needs a newer reader.
         LimitError: It exceeds `limits`.
     """
+    limits = limits.budget()
     return assemble(read(data, limits), limits)
 
 
@@ -91,7 +92,7 @@ def assemble(
     Raises:
         FormatError, UnsupportedError, LimitError: As `parse`.
     """
-    values_of = values_of or values
+    values_of, limits = values_of or values, limits.budget()
     if chunks[0].type != head.TYPE:
         raise FormatError(
             "the first chunk is not HEAD",
@@ -190,7 +191,7 @@ def serialize(c: Container) -> bytes:
     """The file of a container, in canonical order."""
     chunks = present(c)
     if c.history:
-        chunks.append(undo.encode(chunks, c.history))
+        chunks.append(undo.encode(chunks, c.history, check.decompressed(c)))
     return write([*chunks, Chunk("TAIL", b"")])
 
 

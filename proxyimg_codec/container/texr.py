@@ -39,7 +39,8 @@ PYRAMID_FIELDS = (
     Field("alpha", "int", "0 = opaque, n = planes n - 1 give alpha.", 0, 1 << 16),
     Field("part", "ints", "x, y, width, height in samples of what is shown, over the whole box.",
           0, 1 << 24, items=4),
-    Field("cell", "int", "Side of a cell of the mask is 2^cell samples; MUST be 0 without a mask.", 0, 6),
+    Field("cell", "int", "Side of a cell of the mask is 2^cell samples; MUST be 0 without a mask.",
+          0, 6),
     Field("mask", "bin", "Coded array [1, rows, columns] of 1 bit: which cells of the part belong "
           "to the layer; empty = all."),
     Field("cuts", "ints", "Ascending numbers of layers whose boundaries take samples from the "

@@ -12,11 +12,11 @@ from typing import Any
 
 import msgpack
 
-from ..errors import FormatError
+from ..errors import FormatError, LimitError
 from ..limits import DEFAULT_LIMITS, Limits
 from . import meta
 from .chunks import PREFIX, SIGNATURE, Chunk, write
-from .fields import Field, pack, unpack
+from .fields import Few, Field, pack, unpack
 
 TYPE = "uNDO"
 
@@ -49,8 +49,14 @@ class Step:
     chunks: tuple[Chunk, ...]
 
 
-def encode(present: Sequence[Chunk], steps: Sequence[Step]) -> Chunk:
-    """The chunk for a state and the steps that led to it."""
+def encode(present: Sequence[Chunk], steps: Sequence[Step], beside: int = 0) -> Chunk:
+    """The chunk for a state and the steps that led to it.
+
+    Args:
+        present: All other chunks of the file but TAIL.
+        steps: The oldest are left out where they make the file larger than readers accept.
+        beside: Bytes that these chunks decompress to.
+    """
     number: dict[tuple[str, bytes], int] = {}
     for i, chunk in enumerate(present):
         number.setdefault((chunk.type, chunk.payload), i)
@@ -64,7 +70,7 @@ def encode(present: Sequence[Chunk], steps: Sequence[Step]) -> Chunk:
         references += len(keys)
         if references > DEFAULT_LIMITS.references:
             break
-        if size > SIZE_MAX or len(present) + len(kept) + len(fresh) > CHUNKS_MAX:
+        if size > SIZE_MAX - beside or len(present) + len(kept) + len(fresh) > CHUNKS_MAX:
             break
         for key in fresh:
             number[key] = len(present) + len(kept)
@@ -87,11 +93,15 @@ def decode(own: Chunk, present: Sequence[Chunk], where: str, limits: Limits) -> 
         return ()
     history = meta.decompressed(values["size"], values["zstd"], where, limits, "CHK-20")
     try:
+        arrays = 3 + limits.chunks + 2 * STEPS_MAX
+        refusal = LimitError("the history holds too many arrays or items", rule="SEC-2")
+        few = Few(arrays, limits.references + 3 * arrays, refusal)
         content = msgpack.unpackb(
-            history, raw=False, strict_map_key=True, max_ext_len=0, max_array_len=1 << 20
-        )
+            history, raw=False, strict_map_key=True, max_ext_len=0, max_map_len=2,
+            max_array_len=1 << 20, list_hook=few, object_hook=few,
+        )  # fmt: skip
         keys = list(content) if own.old else []
-        kept, steps = content.values() if own.old else content
+        kept, steps = dict.values(content) if own.old else content
         if keys != ["chunks", "steps"][: len(keys)] or len(steps) > STEPS_MAX:
             raise ValueError
         limits.check("chunks", len(present) + len(kept))

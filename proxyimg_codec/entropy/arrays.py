@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from .. import kernel
 from ..errors import FormatError
-from .rans import SCALE_BITS, Decoder, Encoder
+from .rans import FEW, SCALE_BITS, Decoder, Encoder
 
 MODEL_BITS = 4
 """Bits of a value that the adaptive model codes; lower ones are raw."""
@@ -156,6 +156,9 @@ def _decode_symbols(
             decoder, known, ys, xs, bounds, alphabet, (COUNT_START, COUNT_STEP, COUNT_LIMIT)
         )
         return
+    if len(stored) == 1 and known.shape[2] <= FEW and stored.all():
+        known[1, 1:-1] = _decoded_row(decoder, stored.shape[1], known.shape[2], alphabet)
+        return
     model = _Model(known.shape[2], alphabet)
     for a, b in pairwise(bounds):
         y, x = ys[a:b], xs[a:b]
@@ -163,6 +166,27 @@ def _decode_symbols(
         symbols = decoder.symbols(model.cumulative(rows))
         model.update(rows, symbols)
         known[y + 1, x + 1] = symbols.reshape(len(y), -1)
+
+
+def _decoded_row(decoder: Decoder, width: int, channels: int, alphabet: int) -> list[list[int]]:
+    """The symbols [width][channels] of a single row, one after the other.
+
+    Each of its positions is a wavefront, for which numpy takes longer. Of the neighbours only the
+    left one is known, and so it is the context.
+    """
+    contexts = alphabet + 1
+    counts = [[COUNT_START] * alphabet for _ in range(channels * contexts)]
+    last = [0 if alphabet == 2 else alphabet] * channels
+    out = []
+    for _ in range(width):
+        rows = [counts[c * contexts + last[c]] for c in range(channels)]
+        last = decoder.by_counts(rows)
+        out.append(last)
+        for row, symbol in zip(rows, last, strict=True):
+            row[symbol] += COUNT_STEP
+            if sum(row) > COUNT_LIMIT:
+                row[:] = [(n + 1) >> 1 for n in row]
+    return out
 
 
 def pack_bits(values: Ints, width: int) -> bytes:

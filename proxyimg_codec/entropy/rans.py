@@ -7,8 +7,10 @@ few array operations. The encoder runs backwards, hence it records everything fi
 
 from __future__ import annotations
 
+import bisect
 import functools
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +28,9 @@ MAX_LANES_LOG2 = 10
 
 LANE_BITS = 1 << 14
 """Bits that are worth another lane, which costs some 24 bits."""
+
+FEW = 16
+"""With fewer lanes, or symbols, numpy takes longer than one symbol after the other."""
 
 TOO_SHORT = "entropy-coded stream ends too early"
 
@@ -163,6 +168,8 @@ class Decoder:
             FormatError: The stream ends too early.
         """
         n, width = cdf.shape
+        if min(n, self.lanes) < FEW:
+            return self._one_by_one(cdf, _row_starts(n, width))
         table = cdf.astype(np.uint64)
         out = np.empty(n, np.int64)
         for i in range(0, n, self.lanes):
@@ -185,6 +192,8 @@ class Decoder:
             FormatError: The stream ends too early.
         """
         width = table.shape[1]
+        if min(len(rows), self.lanes) < FEW:
+            return self._one_by_one(table, rows * width)
         flat = table.ravel()
         out = np.empty(len(rows), np.int64)
         for i in range(0, len(rows), self.lanes):
@@ -207,6 +216,8 @@ class Decoder:
         Raises:
             FormatError: The stream ends too early.
         """
+        if min(len(widths), self.lanes) < FEW:
+            return self._raw_one_by_one(widths)
         out = np.empty(len(widths), np.int64)
         for i in range(0, len(widths), self.lanes):
             shift = np.uint64(SCALE_BITS) - widths[i : i + self.lanes].astype(np.uint64)
@@ -217,6 +228,72 @@ class Decoder:
             fresh = ((state >> _SCALE_SHIFT) << shift) + slot - (found << shift)
             self._advance(len(shift), fresh)
         return out
+
+    def _one_by_one(self, table: NDArray[Any], starts: NDArray[np.int64]) -> NDArray[np.int64]:
+        """The next N symbols, each by the row of `table` [rows, A + 1] that starts at `starts`."""
+        ends, last = table.ravel().data, table.shape[1] - 1
+        lanes = min(len(starts), self.lanes)
+        states = self.states[:lanes].tolist()
+        out = np.empty(len(starts), np.int64)
+        for i, first in enumerate(starts.tolist()):
+            state = states[i % lanes]
+            slot = state & ((1 << SCALE_BITS) - 1)
+            at = bisect.bisect_right(ends, slot, first + 1, first + last)
+            start = ends[at - 1]
+            state = (ends[at] - start) * (state >> SCALE_BITS) + slot - start
+            states[i % lanes] = self._refilled(state)
+            out[i] = at - first - 1
+        self.states[:lanes] = states
+        return out
+
+    def _raw_one_by_one(self, widths: NDArray[np.int64]) -> NDArray[np.int64]:
+        """As `raw`."""
+        lanes = min(len(widths), self.lanes)
+        states = self.states[:lanes].tolist()
+        out = np.empty(len(widths), np.int64)
+        for i, width in enumerate(widths.tolist()):
+            shift, state = SCALE_BITS - width, states[i % lanes]
+            slot = state & ((1 << SCALE_BITS) - 1)
+            out[i] = slot >> shift
+            state = (state >> SCALE_BITS << shift) + slot - (slot >> shift << shift)
+            states[i % lanes] = self._refilled(state)
+        self.states[:lanes] = states
+        return out
+
+    def by_counts(self, rows: list[list[int]]) -> list[int]:
+        """The next group of symbols, as `symbols` of the distributions that counts stand for.
+
+        Args:
+            rows: Counts of each symbol: its share of what is left when each has a frequency of 1.
+
+        Raises:
+            FormatError: The stream ends too early.
+        """
+        out = []
+        for i, counts in enumerate(rows):
+            state = int(self.states[i % self.lanes])
+            slot = state & ((1 << SCALE_BITS) - 1)
+            room, total = (1 << SCALE_BITS) - len(counts), sum(counts)
+            symbol = start = 0
+            end = room * counts[0] // total + 1
+            while slot >= end and symbol < len(counts) - 1:
+                symbol, start = symbol + 1, end
+                end += room * counts[symbol] // total + 1
+            if symbol == len(counts) - 1:
+                end = 1 << SCALE_BITS
+            state = (end - start) * (state >> SCALE_BITS) + slot - start
+            self.states[i % self.lanes] = self._refilled(state)
+            out.append(symbol)
+        return out
+
+    def _refilled(self, state: int) -> int:
+        """A new state, with another word if it ran low."""
+        if state >= LOW:
+            return state
+        if self.used == len(self.words):
+            raise FormatError(TOO_SHORT, rule="ENT-6")
+        self.used += 1
+        return state << 16 | int(self.words[self.used - 1])
 
     def _advance(self, count: int, state: NDArray[np.uint64]) -> None:
         """Puts new values into the first `count` states, and refills those that ran low."""

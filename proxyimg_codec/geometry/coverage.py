@@ -13,6 +13,8 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
+from ..limits import DEFAULT_LIMITS, Limits
+
 Ints = NDArray[np.int64]
 
 ONE = 256
@@ -57,12 +59,26 @@ def flatten(path: Ints) -> tuple[Ints, Ints]:
     smallest with 3 d <= 4 FLATNESS n^2, where d is the largest second difference of its control
     points (the bound 6 d / (8 n^2) on the distance of a chord, taken coordinate-wise).
     """
-    p = np.stack([path[0::3], path[1::3], path[2::3], np.roll(path[0::3], -1, 0)], 1)
+    p = _segments(path)
+    return _chords(p, _log2_chords(p))
+
+
+def _segments(path: Ints) -> Ints:
+    """Control points [m, 4, 2] of the segments of a path [3 m, 2]."""
+    return np.stack([path[0::3], path[1::3], path[2::3], np.roll(path[0::3], -1, 0)], 1)
+
+
+def _log2_chords(p: Ints) -> Ints:
+    """Into how many chords each segment [m, 4, 2] is divided, as a power of two."""
     d = np.abs(p[:, :2] - 2 * p[:, 1:3] + p[:, 2:]).max((1, 2))
     k = np.zeros(len(p), np.int64)
     for _ in range(MAX_LOG2_CHORDS):
         k += 3 * d > 4 * FLATNESS << (2 * k)
-    k = np.minimum(k, MAX_LOG2_CHORDS)
+    return np.minimum(k, MAX_LOG2_CHORDS)
+
+
+def _chords(p: Ints, k: Ints) -> tuple[Ints, Ints]:
+    """Start [N, 2] and end [N, 2] of 2**k chords of each segment [m, 4, 2]."""
     count = 1 << k
     segment = np.repeat(np.arange(len(p)), count)
     i = np.arange(len(segment)) - np.repeat(np.cumsum(count) - count, count)
@@ -72,10 +88,19 @@ def flatten(path: Ints) -> tuple[Ints, Ints]:
     start = (
         j**3 * q[:, 0] + 3 * j**2 * i * q[:, 1] + 3 * j * i**2 * q[:, 2] + i**3 * q[:, 3]
     ) >> shift
-    return start, np.roll(start, -1, 0)
+    end = np.roll(start, -1, 0)
+    end[np.cumsum(count) - 1] = p[:, 3]
+    return start, end
 
 
-def coverage(paths: Sequence[Ints], x0: int, y0: int, width: int, height: int) -> NDArray[np.int32]:
+def coverage(
+    paths: Sequence[Ints],
+    x0: int,
+    y0: int,
+    width: int,
+    height: int,
+    limits: Limits = DEFAULT_LIMITS,
+) -> NDArray[np.int32]:
     """Coverage [height, width], 0..FULL, of the output pixels from column x0 and row y0 on.
 
     Args:
@@ -84,24 +109,33 @@ def coverage(paths: Sequence[Ints], x0: int, y0: int, width: int, height: int) -
         y0: First row.
         width: Columns.
         height: Rows.
+        limits: Bounds the edges and their pieces.
+
+    Raises:
+        LimitError: There are too many.
     """
     cells = np.zeros(height * (width + 2), np.int64)
-    if paths:
-        edges = [flatten(p) for p in paths]
-        corner = np.array([x0 * ONE, y0 * ONE])
-        start = np.concatenate([e[0] for e in edges]) - corner
-        end = np.concatenate([e[1] for e in edges]) - corner
-        for at in _batches(np.abs(end[:, 1] - start[:, 1]) // ONE + 2, height + 1):
+    corner = np.array([x0 * ONE, y0 * ONE])
+    segments = np.concatenate([np.zeros((0, 4, 2), np.int64), *map(_segments, paths)]) - corner
+    # What lies above, below or to the right leaves no trace here.
+    low, high = segments.min(1), segments.max(1)
+    near = (high[:, 1] > 0) & (low[:, 1] < height * ONE) & (low[:, 0] < width * ONE)
+    segments = segments[near]
+    log2 = _log2_chords(segments)
+    for some in _batches(1 << log2, 1 << MAX_LOG2_CHORDS, limits):
+        start, end = _chords(segments[some], log2[some])
+        for at in _batches(np.abs(end[:, 1] - start[:, 1]) // ONE + 2, height + 1, limits):
             row, x_in, x_out, dy = _split_rows(start[at], end[at], height)
-            for part in _batches(np.abs(x_out - x_in) // ONE + 2, width + 1):
+            for part in _batches(np.abs(x_out - x_in) // ONE + 2, width + 1, limits):
                 _accumulate(cells, row[part], x_in[part], x_out[part], dy[part], width)
     total = np.cumsum(cells.reshape(height, width + 2), axis=1)[:, 1 : width + 1]
     return np.minimum(np.abs(total), FULL).astype(np.int32)
 
 
-def _batches(pieces: Ints, most: int) -> Iterator[slice]:
+def _batches(pieces: Ints, most: int, limits: Limits) -> Iterator[slice]:
     """Slices of items that together make about `PIECES` pieces; an item makes at most `most`."""
     total = np.cumsum(np.minimum(pieces, most))
+    limits.spend("work", int(total[-1]) if len(total) else 0)
     start = 0
     while start < len(pieces):
         done = int(total[start - 1]) if start else 0

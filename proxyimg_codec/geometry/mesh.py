@@ -34,6 +34,9 @@ LEVELS_MAX = 4
 BORDER, NEW, RANKED, FAR = 0, 1, 2, 15
 """Symbols of a gate: nothing beyond it, a new vertex, the vertex of rank s - 2, any old vertex."""
 
+RANKS = FAR - RANKED
+"""Vertices that have a symbol of their own at a gate."""
+
 
 @dataclass(frozen=True, eq=False)
 class Base:
@@ -141,7 +144,7 @@ class Mesh:
             end = at + 4 + int.from_bytes(data[at : at + 4], "little")
             if end > len(data) or count == 0:
                 raise FormatError("split flags are truncated", self._where, rule="MSH-11")
-            self._limits.check("faces", 4 * count)
+            self._limits.spend("faces", 4 * count)
             values = arrays.decode(data[at + 4 : end], (1, 1, count), 1, np.ones((1, count), bool))
             flags.append(values[0, 0] > 0)
             count, at = 4 * int(flags[-1].sum()), end
@@ -251,23 +254,37 @@ class _Border:
     """The growing mesh while it is coded: gates are directed edges that wait for a triangle."""
 
     def __init__(self, count: int) -> None:
-        self.place = np.zeros((count, 2), np.int64)
-        self.open = np.zeros(count, np.int64)
-        self.known = 0
+        self.open = np.zeros(count, np.int32)
+        self._x, self._y = np.zeros((2, count), np.int32)
+        self._places: list[Point] = []
         self.waiting: dict[Edge, int] = {}
         self.used: set[Edge] = set()
         self.queue: deque[Edge] = deque()
 
     def add(self, x: int, y: int) -> int:
         """A new vertex."""
-        self.place[self.known] = x, y
-        self.known += 1
+        self._x[self.known], self._y[self.known] = x, y
+        self._places.append((x, y))
         return self.known - 1
+
+    @property
+    def known(self) -> int:
+        """How many vertices there are."""
+        return len(self._places)
+
+    @property
+    def vertices(self) -> NDArray[np.uint8]:
+        """All of them [known, 2]."""
+        return np.array(self._places, np.uint8)
 
     def at(self, vertex: int) -> Point:
         """Where a vertex is."""
-        x, y = self.place[vertex].tolist()
-        return x, y
+        return self._places[vertex]
+
+    def _open(self, edge: Edge, by: int) -> None:
+        """Counts the gates that its ends are at."""
+        for vertex in edge:
+            self.open[vertex] += by
 
     def next_gate(self) -> tuple[Edge, int] | None:
         """The next gate and the vertex on its near side."""
@@ -275,29 +292,35 @@ class _Border:
             edge = self.queue.popleft()
             if edge in self.waiting:
                 near = self.waiting.pop(edge)
-                self.open[list(edge)] -= 1
+                self._open(edge, -1)
                 return edge, near
         return None
 
     def predicted(self, edge: Edge, near: int) -> Point:
         """The fourth corner of the parallelogram on the far side of a gate."""
-        (ax, ay), (bx, by), (x, y) = self.place[[*edge, near]].tolist()
+        (ax, ay), (bx, by), (x, y) = self.at(edge[0]), self.at(edge[1]), self.at(near)
         return ax + bx - x, ay + by - y
 
     def ranked(self, edge: Edge, near: int) -> Ints:
-        """Vertices at gates that could close the triangle, the nearest to the prediction first."""
-        at = np.flatnonzero(self.open[: self.known] > 0)
-        a, b = self.place[edge[0]], self.place[edge[1]]
-        p = self.place[at]
-        side = (a[0] - b[0]) * (p[:, 1] - b[1]) - (a[1] - b[1]) * (p[:, 0] - b[0])
-        at = at[side > 0]
-        distance = ((self.place[at] - self.predicted(edge, near)) ** 2).sum(1)
-        ranked: Ints = at[np.lexsort((at, distance))]
+        """The first vertices at gates that could close the triangle, nearest to the prediction.
+
+        Of equals the one that was added first; as many as there are symbols for.
+        """
+        at = np.flatnonzero(self.open[: self.known])
+        x, y = self._x.take(at), self._y.take(at)
+        (ax, ay), (bx, by) = self.at(edge[0]), self.at(edge[1])
+        ahead = np.flatnonzero((ax - bx) * y - (ay - by) * x > (ax - bx) * by - (ay - by) * bx)
+        ex, ey = self.predicted(edge, near)
+        distance = (x.take(ahead) - ex) ** 2 + (y.take(ahead) - ey) ** 2
+        if len(ahead) > RANKS:
+            few = np.flatnonzero(distance <= np.partition(distance, RANKS - 1)[RANKS - 1])
+            ahead, distance = ahead[few], distance[few]
+        ranked: Ints = at[ahead[np.argsort(distance, kind="stable")[:RANKS]]]
         return ranked
 
     def place_triangle(self, a: int, b: int, c: int) -> bool:
         """Adds a triangle; false if it is not positive or an edge of it is taken."""
-        (ax, ay), (bx, by), (cx, cy) = self.place[[a, b, c]].tolist()
+        (ax, ay), (bx, by), (cx, cy) = self.at(a), self.at(b), self.at(c)
         edges = ((a, b), (b, c), (c, a))
         if (bx - ax) * (cy - ay) <= (by - ay) * (cx - ax) or not self.used.isdisjoint(edges):
             return False
@@ -305,10 +328,10 @@ class _Border:
             self.used.add((x, y))
             if (y, x) in self.waiting:
                 del self.waiting[y, x]
-                self.open[[x, y]] -= 1
+                self._open((x, y), -1)
             elif (y, x) not in self.used:
                 self.waiting[x, y] = far
-                self.open[[x, y]] += 1
+                self._open((x, y), 1)
                 self.queue.append((x, y))
         return True
 
@@ -335,7 +358,7 @@ def _encode(base: Base) -> dict[str, Any]:
             new[vertex] = border.add(x, y)
             return new[vertex]
         rank = np.flatnonzero(ranked == new[vertex]) if ranked is not None else np.zeros(0)
-        if len(rank) and rank[0] < FAR - RANKED:
+        if len(rank):
             symbols.append(RANKED + int(rank[0]))
         else:
             symbols.append(FAR)
@@ -438,6 +461,6 @@ def _decode(fields: Mapping[str, Any], where: str) -> Base:
     return Base(
         (fields["origin"][0], fields["origin"][1]),
         (fields["step"][0], fields["step"][1]),
-        border.place[: border.known].astype(np.uint8),
+        border.vertices,
         np.array(triangles, np.int32),
     )

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ..limits import DEFAULT_LIMITS, Limits
+from ..limits import DEFAULT_LIMITS, SAMPLE_COST_BITS, Limits
 
 Floats = NDArray[np.float64]
 
@@ -46,7 +46,9 @@ def rasterize(
         triangle, row, first, last = _spans(corners[order[part]], x0, y0, width, height)
         count = np.maximum(last - first, 0)
         # Rows count too, less one a triangle: narrow triangles cost work and cover nothing.
-        covered += int(count.sum()) + max(len(row) - len(order[part]), 0)
+        spent = int(count.sum()) + max(len(row) - len(order[part]), 0)
+        limits.spend("multiply_adds", spent + len(corners) << SAMPLE_COST_BITS)
+        covered += spent
         limits.check("overlap", covered // out.size)
         for some in _batches(count):
             span = np.repeat(np.arange(some.start, some.stop), count[some])

@@ -150,8 +150,8 @@ def check_size(limits: Limits, modes: int, coefficients: int, nodes: int = 0) ->
     Raises:
         LimitError: That exceeds `limits`.
     """
-    limits.check("wavefronts", max(coefficients + 2, nodes + 2 * modes))
-    limits.check("motion", modes * (coefficients + 2 * nodes))
+    limits.spend("wavefronts", coefficients + 2 + nodes + 2 * modes)
+    limits.spend("motion", modes * (coefficients + 2 * nodes))
 
 
 def encode(tracks: list[tuple[Track, Refined]]) -> tuple[Coded, Coded]:

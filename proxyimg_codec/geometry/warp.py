@@ -131,7 +131,7 @@ def barycentric(
     one whose corners' sum lies nearest to three times the point. Of equals the first.
 
     Raises:
-        LimitError: Too many points lie beyond the mesh.
+        LimitError: There are too many points and faces, or too many points beyond the mesh.
     """
     low = nodes.min(0)
     extent = int((nodes.max(0) - low).max())
@@ -141,6 +141,7 @@ def barycentric(
     corners = grid[faces]  # [F, 3, 2]
     first, last = corners.min(1), corners.max(1)
     face = np.full(len(points), -1, np.int64)
+    limits.check("beyond", -(-len(points) // RUN) * len(faces))
     for start in range(0, len(points), RUN):
         part = at[start : start + RUN]
         near = np.flatnonzero(
@@ -214,7 +215,7 @@ class Warp:
         meshed: bool = False,
         limits: Limits = DEFAULT_LIMITS,
     ) -> None:
-        self._pose, self._limits, self._beyond = pose, limits, 0
+        self._pose, self._limits = pose, limits.budget()
         self._mesh = mesh if pose.bent or meshed else None
         if self._mesh is None:
             return
@@ -280,8 +281,7 @@ class Warp:
         at = face.astype(np.int64)
         lost = np.flatnonzero(at < 0)
         points = np.stack([x, y], axis=1) if len(lost) or self._weighing else np.empty((0, 2))
-        self._beyond += len(lost) * len(self._centres)
-        self._limits.check("beyond", self._beyond)
+        self._limits.spend("beyond", len(lost) * len(self._centres))
         at[lost] = nearest(points[lost], self._centres)
         start_x, x_by_x, x_by_y, start_y, y_by_x, y_by_y = (v.take(at) for v in self._away)
         shown_x = x + (start_x + x_by_x * x + x_by_y * y)

@@ -14,7 +14,7 @@ from ..geometry.boundary import Boundary
 from ..geometry.mesh import FRACTION_BITS
 from ..geometry.pose import COLOUR_BITS, OPACITY_MAX
 from ..geometry.warp import Located, Warp
-from ..limits import DEFAULT_LIMITS, Limits
+from ..limits import DEFAULT_LIMITS, SAMPLE_COST_BITS, Limits
 from ..texture import node
 from ..texture.implicit import ImplicitTexture
 from ..texture.network import Floats
@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 
 TILE_SAMPLES = 1 << 16
 """Samples rendered at a time: bounds the memory of any output, and keeps it in the cache."""
+
+ANCHOR_COST_BITS = 7
+"""A feature at an anchor counts as 2**ANCHOR_COST_BITS multiplications, for each sample."""
 
 Rectangle = tuple[int, int, int, int]
 
@@ -47,9 +50,15 @@ def render(
         layers: What to draw.
         engine: Name of who runs the networks.
         out: Called with row, column and float32 [h, w, 4] premultiplied colour and alpha in 0..1.
-        limits: Bounds what deformed layers cost.
+        limits: Bounds what it costs.
+
+    Raises:
+        LimitError: It would cost more.
     """
     sx, sy = view.supersampling
+    limits = limits.budget()
+    samples = view.width * sx * view.height * sy
+    limits.spend("multiply_adds", len(layers) * samples << SAMPLE_COST_BITS)
     painters = [_Painter(image, layer, view, engine, limits) for layer in reversed(layers)]
     tile_w = max(min(view.width, TILE_SAMPLES // (sx * sy)), 1)
     tile_h = max(TILE_SAMPLES // (tile_w * sx * sy), 1)
@@ -57,10 +66,10 @@ def render(
         h = min(tile_h, view.height - row)
         for column in range(0, view.width, tile_w):
             w = min(tile_w, view.width - column)
-            samples = _tile(painters, (column * sx, row * sy, w * sx, h * sy))
+            tile = _tile(painters, (column * sx, row * sy, w * sx, h * sy))
             if sx * sy > 1:
-                samples = samples.reshape(h, sy, w, sx, 4).mean((1, 3), dtype=np.float32)
-            out(row, column, samples)
+                tile = tile.reshape(h, sy, w, sx, 4).mean((1, 3), dtype=np.float32)
+            out(row, column, tile)
 
 
 def _tile(painters: Sequence[_Painter], box: Rectangle) -> Floats:
@@ -89,7 +98,7 @@ class _Painter:
     """One layer on the sample grid of one view."""
 
     def __init__(self, image: Image, layer: Layer, view: View, engine: str, limits: Limits) -> None:
-        self._image, self._layer, self._view = image, layer, view
+        self._image, self._layer, self._view, self._limits = image, layer, view, limits
         self._engine = engine
         self._run = engines.find(engine)
         self.native = self._run is engines.run_native
@@ -114,7 +123,7 @@ class _Painter:
         _, _, w, h = box
         if self._paths is None:
             return cache.Sheet(None, 0, h * w)
-        covered = cover.coverage(self._paths, *box)
+        covered = cover.coverage(self._paths, *box, self._limits)
         seen = np.flatnonzero(covered.max(1))  # faster than any(1)
         first, last = (int(seen[0]), int(seen[-1]) + 1) if len(seen) else (0, 0)
         share = covered[first:last].ravel().astype(np.float32) / np.float32(cover.FULL)
@@ -166,9 +175,14 @@ class _Painter:
             return premultiplied(
                 texture.sample(shown.x, shown.y, layer.box, layer.apart, self.native)
             )
+        network = self._image.networks[texture.network]
+        cost = network.shape.parameters
+        if layer.sampling in (node.BOTH, node.GLOBAL):
+            anchors = 4 if layer.boundary is None else sum(layer.boundary.segments)
+            cost += anchors * len(texture.steps) << ANCHOR_COST_BITS
+        self._limits.spend("multiply_adds", len(at) * cost)
         if layer.sampling:
             return premultiplied(_at_nodes(self._image, layer, texture, shown))
-        network = self._image.networks[texture.network]
         taps = texture.taps(shown.x, shown.y, layer.box)
         return premultiplied(self._run(texture, network, taps))
 

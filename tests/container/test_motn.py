@@ -147,10 +147,11 @@ def test_limits_count_coefficients_and_nodes():
         from_bytes(BASE.data, Limits(motion=total - 1))
     with pytest.raises(LimitError, match=f"motion: {2 * coefficients} exceeds"):
         parse(BASE.data, Limits(motion=2 * coefficients - 1))
-    steps = nodes + 4
-    from_bytes(BASE.data, Limits(wavefronts=steps))
-    with pytest.raises(LimitError, match=f"wavefronts: {steps} exceeds"):
-        from_bytes(BASE.data, Limits(wavefronts=steps - 1))
+    steps = coefficients + 2 + nodes + 4
+    others = sum(t["grid"][0] + 2 * t["grid"][1] for t in parse(BASE.data).textures if "grid" in t)
+    from_bytes(BASE.data, Limits(wavefronts=others + steps))
+    with pytest.raises(LimitError, match=f"wavefronts: {others + steps} exceeds"):
+        from_bytes(BASE.data, Limits(wavefronts=others + steps - 1))
     with pytest.raises(LimitError, match="wavefronts"):
         parse(BASE.data, Limits(wavefronts=coefficients + 1))
 

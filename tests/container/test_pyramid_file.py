@@ -203,10 +203,11 @@ def test_damaged_masks_are_found_when_the_file_is_opened(pyramid, damage):
 def test_limits_hold(pyramid):
     data = pyramid.to_bytes()
     filled = 64 * 48 + 31 * 30
-    parse(data, Limits(samples=64 * 48, filled=filled, codes=16 * 12 + 31 * 30, wavefronts=208))
+    steps = 64 + 3 * 48 + 16 + 2 * 12 + 31 + 2 * 30
+    parse(data, Limits(samples=64 * 48, filled=filled, codes=16 * 12 + 31 * 30, wavefronts=steps))
     for name, value in (
         ("samples", 64 * 48 - 1), ("filled", filled - 1), ("codes", 16 * 12 + 31 * 30 - 1),
-        ("wavefronts", 64 + 3 * 48 - 1), ("wavefronts", 31 + 2 * 30 - 1),
+        ("wavefronts", steps - 1),
     ):  # fmt: skip
         with pytest.raises(LimitError, match=name):
             parse(data, Limits(**{name: value}))

@@ -172,7 +172,6 @@ function checkPoses({ poses, meshes }) {
 
 /** PYR-1 to PYR-3, and the limits of SEC-2. */
 function checkPlans({ plans, textures }, limits) {
-  let samples = 0;
   for (const plan of plans) {
     supported(plan.model === 1, `model ${plan.model}`);
     need(plan.components !== 2, "planes of two components");
@@ -181,8 +180,8 @@ function checkPlans({ plans, textures }, limits) {
     need(plan.lowest.length === plan.components, "the number of lowest scales is wrong");
     need(plan.shifts.length === 2 * plan.levels, "the number of shifts is wrong");
     const [columns, rows] = plan.size.map((n) => Math.ceil(n / 2 ** plan.levels) * 2 ** plan.levels);
-    within((samples += columns * rows), limits.samples, "samples");
-    within(columns + 3 * rows, limits.wavefronts, "wavefronts");
+    limits.spend("samples", columns * rows);
+    limits.spend("wavefronts", columns + 3 * rows);
   }
   let met = 0;
   for (const { coder, planes, alpha } of textures) {
@@ -264,8 +263,7 @@ export function networkSizes({ dim, octaves, hidden, depth, channels }) {
 
 /** SEC-2, as far as it can be told before anything is decoded (SEC-5). */
 function checkLimits({ layers, meshes, networks, textures, motion }, limits) {
-  const spent = { segments: 0, gates: 0, parameters: 0, codes: 0, filled: 0, covered: 0 };
-  const add = (name, count) => within((spent[name] += count), limits[name], name);
+  const add = (name, count) => limits.spend(name, count);
   layers.forEach((layr) => layr.segments.forEach((count) => add("segments", count)));
   meshes.forEach((mesh) => add("gates", mesh.gates));
   if (motion) within(motion.size, limits.metadata_bytes, "metadata_bytes");
@@ -276,13 +274,13 @@ function checkLimits({ layers, meshes, networks, textures, motion }, limits) {
   textures.forEach((texr, k) => {
     if (texr.coder === 1) {
       const [columns, rows] = texr.grid;
-      within(columns + 2 * rows, limits.wavefronts, "wavefronts");
+      add("wavefronts", columns + 2 * rows);
       add("codes", networks[texr.network].dim * columns * rows);
     } else if (texr.coder === 2) {
       const [, , w, h] = texr.part;
       if (texr.mask.length) {
         const [columns, rows] = [w, h].map((n) => Math.ceil(n / 2 ** texr.cell));
-        within(columns + 2 * rows, limits.wavefronts, "wavefronts");
+        add("wavefronts", columns + 2 * rows);
         add("codes", columns * rows);
       }
       if (texr.mask.length || texr.cuts.length) add("filled", w * h);

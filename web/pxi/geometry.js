@@ -146,15 +146,26 @@ function addPiece({ area, carry, columns, top, work }, row, left, right, rise, s
   if (next < columns) carry[at + next] += 512 * sign * rise;
 }
 
-/** A budget of steps (SEC-11). */
+/** What may be spent on one picture that is drawn (SEC-11). */
 export class Work {
   constructor(limits) {
     this.left = limits.work;
     this.limit = limits.work;
+    this.multiplied = 0;
+    this.multiply_adds = limits.multiply_adds;
   }
 
+  /** Edges and their pieces. */
   spend(steps) {
     this.left -= steps;
     if (this.left < 0) within(this.limit - this.left, this.limit, "work");
   }
+
+  /** Multiplications of networks, and SAMPLE_COST for each sample of a layer. */
+  multiply(count) {
+    within((this.multiplied += count), this.multiply_adds, "multiply_adds");
+  }
 }
+
+/** What a sample of a layer counts as. */
+export const SAMPLE_COST = 2 ** 10;

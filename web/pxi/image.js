@@ -11,7 +11,7 @@ import { Motion } from "./motion.js";
 import { displacements } from "./pose.js";
 import { synthesize } from "./synthesis.js";
 import { viewOf } from "./view.js";
-import { LIMITS } from "./limits.js";
+import { Budget, LIMITS } from "./limits.js";
 
 export class Image {
   #cache = new Map();
@@ -22,7 +22,7 @@ export class Image {
    * `loadModel(number)` promises the bytes of a registered model (MODEL_FILES says where they are).
    */
   static async open(bytes, loadModel, limits = {}) {
-    const image = new Image(bytes, { ...LIMITS, ...limits });
+    const image = new Image(bytes, new Budget({ ...LIMITS, ...limits }));
     for (const { model } of image.plans) {
       if (!image.models.has(model)) image.models.set(model, decodeModel(await loadModel(model)));
     }

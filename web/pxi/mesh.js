@@ -1,7 +1,7 @@
 /** Chapter 6, "Base" and "Refinement": the proxy nodes of a layer at rest. */
 
 import { decodeArray, decodeSigned } from "./entropy.js";
-import { need, within } from "./errors.js";
+import { need } from "./errors.js";
 import { takeArray } from "./implicit.js";
 
 const NEW = 1;
@@ -154,7 +154,7 @@ export function decodeMesh(mesh, limits) {
   let triangles = base.triangles.map((t, home) => [home, t]);
   let at = 0;
   for (let level = 0; level < mesh.levels; level++) {
-    within(4 * triangles.length, limits.faces, "faces");
+    limits.spend("faces", 4 * triangles.length);
     const data = takeArray(mesh.splits, at);
     at += 4 + data.length;
     const flags = decodeArray(data, 1, 1, triangles.length, 1);

@@ -1,7 +1,7 @@
 /** Chapter 10: how the nodes of layers move over time. */
 
 import { decodeSigned } from "./entropy.js";
-import { need, within } from "./errors.js";
+import { need } from "./errors.js";
 import { clamp, sumDiv } from "./integers.js";
 import { predict } from "./pose.js";
 import { unzstd } from "./zstd.js";
@@ -18,8 +18,8 @@ export class Motion {
     this.nodes = this.layers.map((layer) => meshes.get(layer).nodes.length / 2);
     const total = this.nodes.reduce((a, b) => a + b);
     const columns = this.layers.length * this.span;
-    within(this.modes * (columns + 2 * total), limits.motion, "motion");
-    within(Math.max(columns + 2, total + 2 * this.modes), limits.wavefronts, "wavefronts");
+    limits.spend("motion", this.modes * (columns + 2 * total));
+    limits.spend("wavefronts", columns + 2 + total + 2 * this.modes);
     this.#decodeCurves(columns);
     this.#decodeShapes(total, meshes);
     if (this.size) checkScript(unzstd(this.script, this.size));

@@ -2,7 +2,7 @@
 
 import { Bent, Straight } from "./chart.js";
 import { within } from "./errors.js";
-import { FULL, Work, coverage, scalePaths } from "./geometry.js";
+import { FULL, SAMPLE_COST, Work, coverage, scalePaths } from "./geometry.js";
 import { anchors, featuresAt, featuresOf, globalFeature, runNetwork } from "./implicit.js";
 import { outline } from "./pose.js";
 import { sampleView } from "./view.js";
@@ -116,6 +116,8 @@ class Sheet {
     this.chart = consulted
       ? new Bent(this.pose, shifts, places, this.mesh, image.limits)
       : new Straight(this.pose);
+    const { layers } = image.networks[this.texr.network] ?? { layers: [] };
+    this.cost = layers.reduce((sum, v) => sum + (v.inputs + 1) * v.outputs, 0);
     this.paint = this.texr.coder === 2 ? this.#ofView(moves.size > 0) : this.#ofPlane();
   }
 
@@ -127,6 +129,7 @@ class Sheet {
   /** Premultiplied colour and alpha of some samples of a band (REN-6). */
   colours(band, samples, work) {
     const count = samples.length;
+    work.multiply(count * (SAMPLE_COST + this.cost));
     const [xs, ys, us, vs] = [0, 1, 2, 3].map(() => new Float64Array(count));
     samples.forEach((i, k) => {
       const row = Math.floor(i / band.columns);

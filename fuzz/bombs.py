@@ -1,0 +1,558 @@
+"""Small files that ask for as much as they may, and what it costs to read them.
+
+    python -m fuzz.bombs [NAME ...] [--numpy]
+
+prints for each the seconds of processor time and the peak of memory that it takes to open it (with
+all that is decoded, short of planes), to check it (`pxi-validate`), and to draw 256 pixels.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import msgpack
+import numpy as np
+import zstandard
+
+from proxyimg_codec import from_bytes, validate
+from proxyimg_codec.container import file, undo
+from proxyimg_codec.container.chunks import Chunk, write
+from proxyimg_codec.container.file import Container
+from proxyimg_codec.entropy import arrays
+from proxyimg_codec.errors import PxiError
+from proxyimg_codec.geometry import deltas
+from proxyimg_codec.geometry.mesh import BORDER, NEW, RANKED, Base, Mesh, _Border
+from proxyimg_codec.texture import planes
+from proxyimg_codec.texture.pyramid import PyramidTexture
+
+Values = dict[str, Any]
+BOMBS: dict[str, Callable[[], bytes]] = {}
+
+SECONDS, BYTES = 300, 12 << 30
+"""What a measurement may take at most."""
+
+
+def bomb(build: Callable[[], bytes]) -> Callable[[], bytes]:
+    """Registers a file by the name of the function that makes it."""
+    BOMBS[build.__name__] = build
+    return build
+
+
+def zeros(channels: int, rows: int, columns: int, bits: int = 4) -> bytes:
+    """A coded array of zeros, which soon cost next to nothing."""
+    values = np.zeros((channels, rows, columns), np.int8)
+    return arrays.encode(values, bits, np.ones((rows, columns), bool))
+
+
+def lonely(rows: int, columns: int) -> bytes:
+    """A coded array of bits of which only the first is set."""
+    values = np.zeros((1, rows, columns), np.int8)
+    values[0, 0, 0] = 1
+    return arrays.encode(values, 1, np.ones((rows, columns), bool))
+
+
+def layer(number: int = 0, **values: Any) -> Values:
+    """A LAYR that covers the canvas."""
+    plain = {"box": [0, 0, 256, 256], "sampling": 0, "unit": 0, "segments": [], "classes": b"",
+             "deltas": b""}  # fmt: skip
+    return {"name": str(number), **plain, **values}
+
+
+def outlined(number: int, count: int, size: int = 256) -> Values:
+    """A LAYR whose boundary has `count` segments that cross the canvas."""
+    points = np.zeros((count, 6), np.int64)
+    points[0::2, ::2], points[1::2, ::2] = size // 3, -(size // 3)
+    points[0::2, 1::2], points[1::2, 1::2] = size // 3, -(size // 3)
+    classes, raw = deltas.encode(points.T)
+    return layer(number, segments=[count], classes=classes, deltas=raw)
+
+
+def network(hidden: int = 4, depth: int = 1, dim: int = 1) -> Values:
+    """A NETW whose weights are as small as can be."""
+    sizes = [dim, *[hidden] * depth, 3]
+    weights = b""
+    for inputs, outputs in pairwise(sizes):
+        coded = zeros(1, outputs, inputs, 2)
+        weights += len(coded).to_bytes(4, "little") + coded
+    rows = sum(sizes[1:])
+    return {
+        "dim": dim, "octaves": 0, "hidden": hidden, "depth": depth, "channels": 3, "bits": 2,
+        "steps": b"\0\x3c" * rows, "biases": bytes(2 * rows), "weights": weights,
+    }  # fmt: skip
+
+
+def codes(columns: int = 2, rows: int = 2, data: bytes = b"", stored: bytes = b"") -> Values:
+    """A TEXR of codes."""
+    data = data or zeros(1, rows, columns)
+    return {"coder": 1, "network": 0, "grid": [columns, rows], "bits": 4, "steps": b"\0\x3c",
+            "stored": stored, "codes": data}  # fmt: skip
+
+
+def plan(columns: int, rows: int, levels: int = 3, data: bytes = b"") -> Values:
+    """A PLAN whose latents are all certain, and cost nothing."""
+    return {
+        "model": 1, "size": [columns, rows], "components": 3, "step": 512, "levels": levels,
+        "grey": 0, "lowest": [0, 0, 0], "shifts": [0, 0] * levels, "cell": 8, "support": b"",
+        "escapes": b"", "data": data or b"\0" + (1 << 16).to_bytes(4, "little") + bytes(4),
+    }  # fmt: skip
+
+
+def view(columns: int, rows: int, planes: int = 0, **values: Any) -> Values:
+    """A TEXR of planes."""
+    plain = {"alpha": 0, "part": [0, 0, columns, rows], "cell": 0, "mask": b"", "cuts": []}
+    return {"coder": 2, "planes": planes, **plain, **values}
+
+
+def made(
+    layers: Sequence[Values], textures: Sequence[Values], networks: Sequence[Values] = (),
+    size: int = 256, **more: Any,
+) -> bytes:  # fmt: skip
+    """A file."""
+    head = {"size": [size, size], "channels": 3, "opaque": 0, "depth": 8}
+    head |= {"layers": len(layers), "networks": len(networks)}
+    return file.serialize(Container(head, tuple(layers), tuple(networks), tuple(textures), **more))
+
+
+def meshed(base: Base, levels: int = 0, number: int = 0) -> Values:
+    """A MESH with all triangles split so often."""
+    mesh = Mesh.build(base)
+    count = len(base.triangles)
+    mesh = mesh.split([np.ones(count << 2 * k, bool) for k in range(levels)])
+    return {"layer": number, **mesh.fields}
+
+
+def grid(columns: int, rows: int) -> Base:
+    """A base of squares of two triangles each."""
+    step = (256 * 1024 // 255 // 16 * 16,) * 2
+    x, y = np.meshgrid(np.arange(columns + 1), np.arange(rows + 1))
+    points = np.stack([x.ravel() * (255 // columns), y.ravel() * (255 // rows)], 1)
+    a = (np.arange(rows)[:, None] * (columns + 1) + np.arange(columns)).ravel()
+    b, c, d = a + 1, a + columns + 1, a + columns + 2
+    triangles = np.stack([a, b, c, b, d, c], 1).reshape(-1, 3)
+    return Base((0, 0), step, points.astype(np.uint8), triangles.astype(np.int32))
+
+
+def plain(**more: Any) -> bytes:
+    """A file of one small layer, and something else."""
+    return made([layer()], [codes()], [network()], **more)
+
+
+# What is read before anything is decoded.
+
+
+@bomb
+def chunks() -> bytes:
+    """As many chunks as there may be."""
+    return plain(extra=(Chunk("abCd", b""),) * ((1 << 16) - 5))
+
+
+@bomb
+def blocks() -> bytes:
+    """Three blocks of metadata, a history and a script."""
+    block = bytes((1 << 26) - 1)
+    return plain(blocks={"icc": block, "exif": block, "xmp": block})
+
+
+@bomb
+def window() -> bytes:
+    """A block with as large a window as there may be."""
+    parameters = zstandard.ZstdCompressionParameters(window_log=27, compression_level=1)
+    compressor = zstandard.ZstdCompressor(compression_params=parameters).compressobj()
+    frame = compressor.compress(b"a") + compressor.flush()
+    payload = msgpack.packb([1, frame])
+    return plain(extra=tuple(Chunk(t, payload) for t in ("iCCp", "eXIf", "xMPd")))
+
+
+def _history(content: bytes) -> bytes:
+    chunks = file.present(file.parse(plain()))
+    frame = zstandard.ZstdCompressor(level=9).compress(content)
+    own = msgpack.packb([undo.digest(chunks), len(content), frame])
+    return write([*chunks, Chunk("uNDO", own), Chunk("TAIL", b"")])
+
+
+@bomb
+def history_arrays() -> bytes:
+    """A history of 60 million empty arrays."""
+    return _history(b"\x92\xdc\0\x3c" + (b"\xdd\0\x0f\xff\xff" + b"\x90" * 0xFFFFF) * 60 + b"\x90")
+
+
+@bomb
+def history_numbers() -> bytes:
+    """A history of 60 million numbers."""
+    return _history(b"\x92\x90\xdc\0\x3c" + (b"\x92\xa0\xdd\0\x0f\xff\xff" + b"\0" * 0xFFFFF) * 60)
+
+
+@bomb
+def history_states() -> bytes:
+    """As many references to chunks as there may be."""
+    steps = [["", [0] * 256] for _ in range(4096)]
+    return _history(msgpack.packb([[], steps]))
+
+
+@bomb
+def history_chunks() -> bytes:
+    """A history of large chunks, all of which must be parsed to go back."""
+    kept = [["TEXR", msgpack.packb([1, bytes(1000)])] for _ in range(60000)]
+    return _history(msgpack.packb([kept, [["", [7]]]]))
+
+
+@bomb
+def arrays_in_payload() -> bytes:
+    """A chunk of a megabyte of empty arrays."""
+    payload = b"\x93" + (b"\xdd\0\x05\0\0" + b"\x90" * 0x50000) * 3
+    return plain(extra=(Chunk("tREE", payload),))
+
+
+@bomb
+def numbers_in_payload() -> bytes:
+    """Chunks of many numbers."""
+    more = msgpack.packb(["", "", [300] * 330_000])
+    return plain(extra=(Chunk("iNFO", more),))
+
+
+@bomb
+def tree() -> bytes:
+    """A chain of groups."""
+    count = 100_000
+    names = [f"{k:x}g" for k in range(count)]
+    parents = [2, *range(3, count + 2), 0]
+    return plain(tree={"groups": names, "parents": parents})
+
+
+# Shapes.
+
+
+@bomb
+def segments() -> bytes:
+    """One boundary of as many segments as there may be."""
+    return made([outlined(0, (1 << 16) - 2)], [codes()], [network()])
+
+
+@bomb
+def long_segments() -> bytes:
+    """The same on a huge canvas."""
+    return made([outlined(0, 1 << 16, 1 << 20)], [codes()], [network()], size=1 << 20)
+
+
+@bomb
+def layers() -> bytes:
+    """As many layers as there may be, with as many segments each."""
+    return made(
+        [outlined(k, 64) for k in range(1024)],
+        [codes(), *[{"coder": 0, "texture": 0}] * 1023],
+        [network()],
+    )
+
+
+@bomb
+def gates() -> bytes:
+    """A mesh whose gates are open all at once, and are closed with vertices of high rank."""
+    count, total = 21_000, 1 << 16
+    border = _Border(count)
+    symbols, places = [NEW] * 3, [(100, 100), (10, 0), (0, 10)]
+    corners = [border.add(100, 100), border.add(110, 100), border.add(110, 110)]
+    border.place_triangle(*corners)
+    rng = np.random.default_rng(1)
+    while (gate := border.next_gate()) is not None:
+        (a, b), near = gate
+        if len(symbols) == total:
+            break
+        expected = border.predicted((a, b), near)
+        if border.known < count:
+            # On the far side of the gate from what is near it.
+            (ax, ay), (bx, by) = border.at(a), border.at(b)
+            some = rng.integers(0, 256, (200, 2)).tolist()
+            good = [p for p in some if (ax - bx) * (p[1] - by) > (ay - by) * (p[0] - bx)]
+            if not good:
+                symbols.append(BORDER)
+                continue
+            (x, y), *_ = good
+            border.place_triangle(b, a, border.add(x, y))
+            places.append((_wrap(x - expected[0]), _wrap(y - expected[1])))
+            symbols.append(NEW)
+            continue
+        for rank, vertex in enumerate(border.ranked((a, b), near)[:13]):
+            if border.place_triangle(b, a, int(vertex)):
+                symbols.append(RANKED + rank)
+                break
+        else:
+            symbols.append(BORDER)
+    return _connected(symbols, places)
+
+
+def _wrap(value: int) -> int:
+    return (value + 128) % 256 - 128
+
+
+def _connected(symbols: list[int], places: list[tuple[int, int]]) -> bytes:
+    classes, raw = deltas.encode(np.array(places, np.int64).T)
+    stored = np.ones((1, len(symbols)), bool)
+    mesh = {
+        "layer": 0, "origin": [0, 0], "step": [1024, 1024], "vertices": len(places),
+        "gates": len(symbols), "symbols": arrays.encode(np.array(symbols)[None, None], 4, stored),
+        "far": [], "classes": classes, "deltas": raw, "levels": 0, "splits": b"",
+    }  # fmt: skip
+    return made([layer()], [codes()], [network()], meshes=(mesh,), poses=(bent(0, 1),))
+
+
+def bent(number: int, nodes: int) -> Values:
+    """A POSE that displaces the first of some nodes."""
+    values = np.zeros((2, 1, nodes), np.int64)
+    values[0, 0, 0] = 16
+    classes, raw = deltas.encode(values)
+    return {
+        "layer": number, "matrix": [1 << 24, 0, 0, 1 << 24], "shift": [0, 0], "opacity": 65535,
+        "hidden": 0, "colour": [], "node_classes": classes, "node_deltas": raw,
+        "place_classes": b"", "place_deltas": b"",
+    }  # fmt: skip
+
+
+def _nodes(values: Mapping[str, Any]) -> int:
+    return len(Mesh({k: v for k, v in values.items() if k != "layer"}).refined.nodes)
+
+
+@bomb
+def gate_grid() -> bytes:
+    """A mesh of as many gates as there may be."""
+    mesh = meshed(grid(180, 180))
+    return made([layer()], [codes()], [network()], meshes=(mesh,), poses=(bent(0, _nodes(mesh)),))
+
+
+@bomb
+def faces() -> bytes:
+    """A mesh of as many faces as there may be."""
+    mesh = meshed(grid(16, 24), 4)
+    return made([layer()], [codes()], [network()], meshes=(mesh,), poses=(bent(0, _nodes(mesh)),))
+
+
+@bomb
+def meshes() -> bytes:
+    """Many small meshes of many faces each."""
+    one = meshed(grid(2, 2), 4)
+    pose, count = bent(0, _nodes(one)), 96
+    return made(
+        [layer(k) for k in range(count)], [codes(), *[{"coder": 0, "texture": 0}] * (count - 1)],
+        [network()], meshes=tuple(one | {"layer": k} for k in range(count)),
+        poses=tuple(pose | {"layer": k} for k in range(count)),
+    )  # fmt: skip
+
+
+@bomb
+def riders() -> bytes:
+    """A boundary of many pieces on a mesh of many faces."""
+    mesh = meshed(grid(16, 16), 3)
+    return made(
+        [outlined(0, 1 << 12, 4096)], [codes()], [network()], size=4096, meshes=(mesh,),
+        poses=(bent(0, _nodes(mesh)),),
+    )  # fmt: skip
+
+
+def _motion(coefficients: int, modes: int, mesh: Values, **values: Any) -> bytes:
+    plain = {
+        "duration": 1000, "fps": 24, "loop": 1, "intervals": coefficients, "unit": 0,
+        "layers": [0], "bodies": [0], "modes": modes, "size": 0, "script": b"",
+        "curve_classes": zeros(modes, 1, coefficients), "curve_deltas": b"",
+        "shape_classes": zeros(2, modes, _nodes(mesh)), "shape_deltas": b"",
+    }  # fmt: skip
+    return made([layer()], [codes()], [network()], meshes=(mesh,), motion=plain | values)
+
+
+@bomb
+def curves() -> bytes:
+    """As long curves as there may be."""
+    return _motion(65_500, 63, meshed(grid(1, 1)))
+
+
+@bomb
+def shapes() -> bytes:
+    """As many shapes of as many nodes as there may be."""
+    mesh = meshed(grid(15, 16), 3)
+    return _motion(1, 60, mesh)
+
+
+# Textures.
+
+
+@bomb
+def parameters() -> bytes:
+    """One network of as many parameters as there may be."""
+    net = network(1024, 4)
+    return made([layer()], [codes()], [net])
+
+
+@bomb
+def wide_network() -> bytes:
+    """A network of a quarter of a million multiplications a sample, on many layers."""
+    return made(
+        [layer(k, box=[0, 0, 256, 256]) for k in range(256)],
+        [codes(), *[{"coder": 0, "texture": 0}] * 255], [network(512, 2)],
+    )  # fmt: skip
+
+
+@bomb
+def networks() -> bytes:
+    """Many networks."""
+    return made([layer()], [codes()], [network(250, 2)] * 64)
+
+
+@bomb
+def one_plane_of_codes() -> bytes:
+    """A plane of as many codes as there may be."""
+    return made([layer()], [codes(4096, 4096)], [network()])
+
+
+@bomb
+def columns_of_codes() -> bytes:
+    """Planes of codes that are high and narrow: many wavefronts."""
+    data = codes(2, 32_760)
+    count = 2
+    return made([layer(k) for k in range(count)], [data] * count, [network()])
+
+
+@bomb
+def holes() -> bytes:
+    """A plane of codes of which one is stored: all others are filled."""
+    side = 4096
+    mask, one = lonely(side, side), zeros(1, 1, 1)
+    return made([layer()], [codes(side, side, one, mask)], [network()])
+
+
+@bomb
+def mask() -> bytes:
+    """A mask of as many cells as there may be."""
+    side = 4096
+    return made([layer()], [view(side, side, mask=lonely(side, side))], planes=(plan(side, side),))
+
+
+@bomb
+def masks() -> bytes:
+    """Narrow masks: many wavefronts."""
+    coded = lonely(16_000, 2)
+    count = 2
+    return made(
+        [layer(k) for k in range(count)], [view(2, 16_000, mask=coded)] * count,
+        planes=(plan(2, 16_000, 1),),
+    )  # fmt: skip
+
+
+@bomb
+def samples() -> bytes:
+    """A raster of as many samples as there may be."""
+    return made([layer()], [view(8192, 8192)], planes=(plan(8192, 8192, 3),))
+
+
+@bomb
+def rasters() -> bytes:
+    """Rasters of one sample each, with as many levels as there may be."""
+    data = planes.encoded(
+        planes.Latents(tuple(np.zeros((9, 1 << k, 1 << k), np.int32) for k in range(7, -1, -1)),
+                       np.zeros((3, 1, 1), np.int32)), (1, 1), 512, cell=8,
+    ).packed  # fmt: skip
+    count = 120
+    return made(
+        [layer(k) for k in range(count)], [view(1, 1, k) for k in range(count)],
+        planes=(data,) * count,
+    )  # fmt: skip
+
+
+@bomb
+def latents() -> bytes:
+    """A megabyte of random latents."""
+    words = np.random.default_rng(1).integers(0, 1 << 16, 480_000).astype("<u2").tobytes()
+    data = b"\0" + (1 << 17).to_bytes(4, "little") + (480_000).to_bytes(4, "little") + words
+    own = plan(2048, 2048, 3, data) | {"lowest": [30] * 3, "shifts": [15] * 6, "step": 0}
+    return made([layer()], [view(2048, 2048)], planes=(own,))
+
+
+@bomb
+def cuts() -> bytes:
+    """A view that many boundaries cut."""
+    side, count = 2048, 400
+    box = [0, 0, side, side]
+    back = view(side, side, cuts=list(range(1, count)))
+    return made(
+        [layer(0, box=box), *(outlined(k, 100, side) for k in range(1, count))],
+        [back, *[view(side, side)] * (count - 1)], planes=(plan(side, side),), size=side,
+    )  # fmt: skip
+
+
+def opened(data: bytes) -> None:
+    """Opens a file, with all that is decoded, short of planes."""
+    image = from_bytes(data)
+    for own in image.layers:
+        if own.mesh is not None:
+            _ = own.mesh.refined
+        if not isinstance(own.texture, PyramidTexture):
+            _ = own.texture.table
+
+
+def drawn(data: bytes) -> None:
+    """Draws 256 pixels, across or down."""
+    image = from_bytes(data)
+    size = {"width": 256} if image.width >= image.height else {"height": 256}
+    image.render(**size)  # type: ignore[arg-type]
+
+
+STAGES = {"open": opened, "check": lambda data: bool(validate.validate(data)), "draw": drawn}
+
+
+def _stage(name: str, path: str) -> None:
+    """Runs a stage in a process of its own, and prints what it took."""
+    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
+    resource.setrlimit(resource.RLIMIT_AS, (BYTES, BYTES))
+    data = Path(path).read_bytes()
+    before = resource.getrusage(resource.RUSAGE_SELF)
+    try:
+        STAGES[name](data)
+        said = "ok"
+    except PxiError as error:
+        said = f"{type(error).__name__} {error.rule}"
+    except MemoryError:
+        said = "MemoryError"
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    seconds = used.ru_utime + used.ru_stime - before.ru_utime - before.ru_stime
+    print(f"{seconds:6.1f} s {used.ru_maxrss >> 10:6} MB  {said}")
+
+
+def measure(name: str, numpy_only: bool) -> None:
+    """Prints a line for each stage of a file."""
+    import os
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "bomb.pxi"
+        path.write_bytes(BOMBS[name]())
+        size = path.stat().st_size
+        for stage in STAGES:
+            command = [sys.executable, "-m", "fuzz.bombs", "--stage", stage, str(path)]
+            environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+            if numpy_only:
+                environment["PROXYIMG_NO_KERNEL"] = "1"
+            ran = subprocess.run(command, capture_output=True, text=True, env=environment)
+            lines = (ran.stdout or f"died: {ran.returncode} {ran.stderr[-200:]}").splitlines()
+            print(f"{name:20} {size:8} {stage:6} {lines[-1]}", flush=True)
+
+
+def main() -> None:
+    """Entry point."""
+    p = argparse.ArgumentParser("fuzz.bombs", description=__doc__)
+    p.add_argument("names", nargs="*", metavar="NAME")
+    p.add_argument("--numpy", action="store_true", help="without the compiled kernel")
+    p.add_argument("--stage", choices=STAGES, help=argparse.SUPPRESS)
+    args = p.parse_args()
+    if args.stage:
+        _stage(args.stage, *args.names)
+        return
+    for name in args.names or BOMBS:
+        measure(name, args.numpy)
+
+
+if __name__ == "__main__":
+    main()
