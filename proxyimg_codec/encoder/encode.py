@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Protocol
@@ -24,6 +25,9 @@ from .masks import Region
 from .meshes import with_meshes
 from .problem import Problem, build
 from .settings import Settings
+
+CODES_MAX = DEFAULT_LIMITS.codes
+"""Codes that readers accept: where a large picture would have more, they lie further apart."""
 
 
 class Progress(Protocol):
@@ -122,7 +126,11 @@ def fit_image(
         settings: What is asked for.
         report: As `Progress`.
     """
-    problem = problem_of(settings.network(pixels, plan.channels), settings.spacing)
+    shape, spacing = settings.network(pixels, plan.channels), settings.spacing
+    problem = problem_of(shape, spacing)
+    while (codes := shape.dim * sum(plane.size for plane in problem.planes)) > CODES_MAX:
+        spacing *= 1.02 * math.sqrt(codes / CODES_MAX)
+        problem = problem_of(shape, spacing)
     if (problem.target == problem.target[0]).all():
         problem = problem_of(NetShape(1, 0, 1, 1, plan.channels), np.inf)
     elif settings.sampling == "node":

@@ -40,6 +40,16 @@ def test_quality_is_monotonic():
     assert values[-1] > values[0] + 3
 
 
+def test_large_pictures_keep_within_what_readers_accept(photo, monkeypatch):
+    def codes():
+        image = pxi.encode(photo, quality=90, **FAST)
+        return sum(v.texture.codes.size for v in image.layers)
+
+    before = codes()
+    monkeypatch.setattr("proxyimg_codec.encoder.encode.CODES_MAX", before // 2)
+    assert before // 3 < codes() <= before // 2
+
+
 def test_effort_helps(photo):
     values = [
         psnr(photo, pxi.encode(photo, texture="implicit", effort=e, jobs=1, max_layers=1))
