@@ -456,7 +456,13 @@ def test_ctrl_c_loses_nothing(check_error, tmp_path, old):
     if old:
         out.write_bytes(old)
     command = [sys.executable, ROOT / "bin" / "pxi-encode", "-", out, "-f", "-e", "9", "-j", "1"]
-    process = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE)
+    # Where the tests run in the background of a shell, interrupts are ignored, which is inherited.
+    process = subprocess.Popen(
+        command,
+        stdin=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
     # More than a pipe holds: once it is through, the tool is at work.
     process.stdin.write(encode_ppm(gradient(256, 256)))
     process.stdin.close()
