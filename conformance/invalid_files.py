@@ -51,7 +51,7 @@ def _joined(b: Base) -> bytes:
 
 def _short(b: Base) -> bytes:
     """The length of LAYR ends within its payload: its CRC would be that of other bytes."""
-    return put(b.data, b.chunks[BACK].offset + 4, lambda v: v - 2)  # type: ignore[operator]
+    return put(b.data, b.chunks[BACK].offset + 4, lambda v: v - 2)  # type: ignore[operator]  # it was read
 
 
 def _inner(change: Callable[[int], int]) -> Callable[[Base], bytes]:

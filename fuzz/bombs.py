@@ -498,7 +498,7 @@ def drawn(data: bytes) -> None:
     """Draws 256 pixels, across or down."""
     image = from_bytes(data)
     size = {"width": 256} if image.width >= image.height else {"height": 256}
-    image.render(**size)  # type: ignore[arg-type]
+    image.render(**size)  # type: ignore[arg-type]  # width or height
 
 
 STAGES = {"open": opened, "check": lambda data: bool(validate.validate(data)), "draw": drawn}
