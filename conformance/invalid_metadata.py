@@ -13,6 +13,7 @@ from proxyimg_codec.container.chunks import Chunk, write
 from .builders import Numbers, layer, network, picture, texture
 from .frames import MAGIC, checksum, frame, metadata
 from .invalid import Base, Invalid
+from .invalid_motion import Moving
 from .metadata import history, info, scripted, with_chunks
 
 
@@ -51,6 +52,26 @@ def _history(content: Any, **new: Any) -> Callable[[Base], bytes]:
 
 def _steps(*references: int) -> Callable[[Base], bytes]:
     return _history([[], [["{}", list(references)]]])
+
+
+def _together(b: Base) -> bytes:
+    """Two blocks that only together exceed the limit."""
+    half = 1 << 25
+    blocks = ((kind, half + (kind == "xmp")) for kind in ("icc", "xmp"))
+    return with_chunks(b.data, *(
+        metadata(kind, b"", frame((0, size)), size=size) for kind, size in blocks
+    ))  # fmt: skip
+
+
+def _with_script(b: Base) -> bytes:
+    """A block that is as large as may be, beside a script."""
+    return with_chunks(b.data, metadata("xmp", b"", frame((0, 1 << 26)), size=1 << 26))
+
+
+def _with_history(b: Base) -> bytes:
+    """A block that is as large as may be, and a history."""
+    data = _with_script(b)
+    return with_chunks(data, history(data, msgpack.packb([[], []])))
 
 
 def _early(b: Base) -> bytes:
@@ -114,6 +135,8 @@ _BLOCKS: list[_Row] = [
     ("invalid-block-none", "a block of no bytes", "", _block(frame(b""), 0)),
     ("limit-block", "a block of 64 megabytes and a byte", "SEC-6",
      _block(frame((0, (1 << 26) + 1)), (1 << 26) + 1, "xmp")),
+    ("limit-blocks-together", "two blocks of 32 megabytes, and a byte", "SEC-6", _together),
+    ("limit-block-history", "a block of 64 megabytes, and a history", "SEC-6", _with_history),
     ("limit-window", "a frame that needs a window of two gigabytes", "SEC-6", _window),
     ("invalid-block-twice", "two profiles", "", _twice),
 ]
@@ -179,10 +202,18 @@ _SCRIPTS: list[_Row] = [
     ("invalid-script-after", "a byte after the frame of a script", "CHK-16",
      lambda b: scripted(frame(b"{}") + b"\0", 2)),
 ]
+
+_MOVING: list[_Row] = [
+    ("limit-block-script", "a block of 64 megabytes, and a script", "SEC-6", _with_script),
+]
 # fmt: on
 
 CASES = {
-    name: Invalid(title[0].upper() + title[1:], tuple(tests.split()), build, Plain, optional)
-    for rows, optional in (((*_BLOCKS, *_OTHERS, *_HISTORIES), True), (_SCRIPTS, False))
+    name: Invalid(title[0].upper() + title[1:], tuple(tests.split()), build, base, optional)
+    for rows, base, optional in (
+        ((*_BLOCKS, *_OTHERS, *_HISTORIES), Plain, True),
+        (_SCRIPTS, Plain, False),
+        (_MOVING, Moving, True),
+    )
     for name, title, tests, build in rows
 }

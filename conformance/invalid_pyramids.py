@@ -121,25 +121,25 @@ def _swapped(b: Base) -> bytes:
 
 
 def _many(b: Base) -> bytes:
-    """Three layers that each show a raster of 2^26 samples with a mask."""
-    side = 1 << 13
-    texture = {"part": [0, 0, side, side], "cell": 6, "mask": _bits(np.eye(128, dtype=int))}
+    """Nine layers that each show a raster of 2^24 samples with a mask."""
+    side = 1 << 12
+    texture = {"part": [0, 0, side, side], "cell": 6, "mask": _bits(np.eye(64, dtype=int))}
     return write([
-        _changed(b, HEAD, layers=3, opaque=0),
-        *(_changed(b, DISC, name=name) for name in "abc"),
+        _changed(b, HEAD, layers=9, opaque=0),
+        *(_changed(b, DISC, name=name) for name in "abcdefghi"),
         _changed(b, PLAN, size=[side, side], support=b""),
-        *[_changed(b, DISC_TEXR, **texture)] * 3,
+        *[_changed(b, DISC_TEXR, **texture)] * 9,
         b.chunks[TAIL],
     ])  # fmt: skip
 
 
 def _carved(b: Base) -> bytes:
-    """A layer of 2^26 samples that 33 others cut."""
-    side, others = 1 << 13, range(1, 34)
+    """A layer of 2^24 samples that 129 others cut."""
+    side, others = 1 << 12, range(1, 130)
     box, part = [0, 0, side, side], {"part": [0, 0, side, side], "cuts": list(others)}
     shared = replace(b.chunks[DISC_TEXR], payload=msgpack.packb([0, 0]))
     return write([
-        _changed(b, HEAD, layers=34),
+        _changed(b, HEAD, layers=130),
         _changed(b, BACK, box=box),
         *(_changed(b, DISC, name=str(k)) for k in others),
         _changed(b, PLAN, size=[side, side], support=b""),
@@ -149,8 +149,25 @@ def _carved(b: Base) -> bytes:
     ])  # fmt: skip
 
 
+def _carving(b: Base) -> bytes:
+    """A layer of 2^24 samples that cuts itself, in front of 128 others."""
+    side, count = 1 << 12, 129
+    shared = replace(b.chunks[DISC_TEXR], payload=msgpack.packb([0, 0]))
+    own = {"part": [0, 0, side, side], "cell": 0, "mask": b"", "cuts": [count - 1]}
+    return write([
+        _changed(b, HEAD, layers=count),
+        b.chunks[BACK],
+        *(_changed(b, DISC, name=str(k), box=[0, 0, side, side]) for k in range(1, count)),
+        _changed(b, PLAN, size=[side, side], support=b""),
+        b.chunks[BACK_TEXR],
+        *[shared] * (count - 2),
+        _changed(b, DISC_TEXR, **own),
+        b.chunks[TAIL],
+    ])  # fmt: skip
+
+
 def _large_mask(b: Base) -> bytes:
-    size = [1 << 13, 4097]
+    size = [1 << 12, 2049]
     chunks = list(b.chunks)
     chunks[PLAN] = _changed(b, PLAN, size=size)
     chunks[DISC_TEXR] = _changed(b, DISC_TEXR, part=[0, 0, *size], cell=0)
@@ -203,12 +220,14 @@ _PLANES: list[_Row] = [
      lambda b: b.set(PLAN, support=_bits([[1, 1, 1], [1, 1, 1], [1, 1, 0]]))),
     ("limit-samples", "a raster of 2^27 samples", "SEC-8",
      lambda b: b.set(PLAN, size=[1 << 14, 1 << 13])),
-    ("limit-raster", "a raster of 16 million rows", "SEC-8",
-     lambda b: b.set(PLAN, size=[1, 1 << 24])),
-    ("limit-mask", "a mask of 2^25 cells and some", "",
+    ("limit-raster", "a raster of 44,000 rows", "SEC-8",
+     lambda b: b.set(PLAN, size=[1, 44_000])),
+    ("limit-mask", "a mask of 2^23 cells and some", "",
      _large_mask),
-    ("limit-filled", "three layers of 2^26 samples that have to be filled", "", _many),
-    ("limit-covered", "a layer of 2^26 samples that 33 others cut", "", _carved),
+    ("limit-filled", "nine layers of 2^24 samples that have to be filled", "", _many),
+    ("limit-covered", "a layer of 2^24 samples that 129 others cut", "", _carved),
+    ("limit-covered-behind", "a layer of 2^24 samples that cuts itself, and 128 behind it", "",
+     _carving),
 ]
 
 _STREAMS: list[_Row] = [

@@ -13,6 +13,7 @@ import resource
 import signal
 import sys
 import tempfile
+import traceback
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -93,6 +94,8 @@ def forked(work: Callable[[io.TextIOBase], None]) -> tuple[list[str], int]:
                 with open(target, "w", encoding="utf-8", buffering=1) as out:
                     work(out)
                 status = 0
+            except BaseException:
+                traceback.print_exc()
             finally:
                 os._exit(status)
         os.close(target)

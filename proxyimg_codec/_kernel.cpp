@@ -41,6 +41,7 @@ typedef float vec8 __attribute__((vector_size(32), aligned(4), may_alias));  // 
 #include "_kernel_pyramid.h"
 #include "_kernel_synthesis.h"
 #include "_kernel_sample.h"
+#include "_kernel_coverage.h"
 
 static const int BLOCK = 256, NV = BLOCK / LANES, PARTS = 4, MAX_LAYERS = 10, SPAN = 32;
 static const float PI = 3.14159265358979f;
@@ -547,6 +548,10 @@ int pxi_pyramid_synthesis(const Synthesis *level) {
 }
 
 // Samples at points, see `sample`; `channels` is 3 or 4.
+int pxi_coverage(Cover *to, const int64_t *segments, const int64_t *log2, int64_t n) {
+    return coverage(*to, segments, log2, n);
+}
+
 void pxi_sample(const float *samples, int64_t stride, int32_t channels, const Points *at, float *out) {
     if (channels == 3)
         sample<3>(samples, stride, *at, out);

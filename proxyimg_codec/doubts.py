@@ -76,7 +76,7 @@ def find(image: Image, c: Container, place: Place) -> Iterator[Issue]:
         c: Its container.
         place: Tells where a chunk is.
     """
-    for chunk in c.extra:
+    for chunk in image.extra:
         yield doubt("VAL-1", f"it has {chunk.size} bytes", chunk.type, chunk.offset)
     yield from _metadata(image, c, place)
     for i, layer in enumerate(image.layers):

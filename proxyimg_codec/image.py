@@ -26,7 +26,7 @@ from .geometry.boundary import Boundary
 from .geometry.mesh import Mesh
 from .geometry.pose import REST, Pose
 from .geometry.track import Timeline, Track
-from .limits import DEFAULT_LIMITS, Limits
+from .limits import DEFAULT_LIMITS, SMALL_FILE, Limits
 from .render.cache import Cache
 from .render.compose import render
 from .render.view import make_view
@@ -365,11 +365,15 @@ class Image:
         Raises:
             LimitError: It is larger than readers accept by default.
         """
-        from .packing import pack
+        from .packing import pack, padding
 
-        content = pack(self)
-        check(content, DEFAULT_LIMITS)
-        return container.serialize(content)
+        content, budget = pack(self), DEFAULT_LIMITS.budget()
+        check(content, budget)
+        data = container.serialize(content)
+        if len(data) > SMALL_FILE or budget.fits_small():
+            return data
+        extra = (*content.extra, padding(SMALL_FILE - len(data)))
+        return container.serialize(replace(content, extra=extra))
 
     @cached_property
     def chunks(self) -> tuple[Chunk, ...]:

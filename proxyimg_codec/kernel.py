@@ -71,6 +71,15 @@ class Points(ct.Structure):
     _fields_ = [*((n, ct.c_void_p) for n in ("first", "fx", "fy")), ("n", ct.c_int64)]
 
 
+class Cover(ct.Structure):
+    """What covers a rectangle of pixels; mirrors `struct Cover`."""
+
+    _fields_ = [
+        *((n, ct.c_int64) for n in ("width", "height", "work", "most")),
+        *((n, ct.c_void_p) for n in ("cells", "out")),
+    ]
+
+
 @functools.cache
 def library() -> ct.CDLL | None:
     """The loaded kernel, or None where it was not built or does not load on this machine.
@@ -102,6 +111,8 @@ def library() -> ct.CDLL | None:
             lib.pxi_pyramid_level.argtypes = [ct.c_void_p]
             lib.pxi_pyramid_synthesis.restype = ct.c_int
             lib.pxi_pyramid_synthesis.argtypes = [ct.c_void_p]
+            lib.pxi_coverage.restype = ct.c_int
+            lib.pxi_coverage.argtypes = [ct.POINTER(Cover), ct.c_void_p, ct.c_void_p, ct.c_int64]
             lib.pxi_sample.restype = None
             lib.pxi_sample.argtypes = [
                 ct.c_void_p, ct.c_int64, ct.c_int32, ct.POINTER(Points), ct.c_void_p,
@@ -203,6 +214,31 @@ def blend(
         raise ValueError("the kernel takes float32 only")
     covered = None if coverage is None else pointer(coverage)
     lib.pxi_blend(pointer(result), pointer(clear), pointer(colour), covered, len(result))
+
+
+def coverage(
+    segments: NDArray[np.int64], log2: NDArray[np.int64], width: int, height: int, most: int
+) -> tuple[NDArray[np.int32], int]:
+    """Coverage [height, width] of pixels, as `geometry.coverage` computes it in numpy.
+
+    Args:
+        segments: Control points [m, 4, 2] in 1/256 pixel.
+        log2: Into how many chords each is divided, as a power of two.
+        width: Columns.
+        height: Rows.
+        most: Pieces of chords, in rows and in pixels, after which it stops.
+
+    Returns:
+        The coverage, and the number of pieces; with more than `most` of these, the coverage is not
+        complete.
+    """
+    lib = library()
+    assert lib is not None, "check available() first"
+    cells, out = np.zeros((height, width + 2), np.int64), np.zeros((height, width), np.int32)
+    segments = np.ascontiguousarray(segments)
+    to = Cover(width, height, 0, most, pointer(cells), pointer(out))
+    lib.pxi_coverage(ct.byref(to), pointer(segments), pointer(log2), len(log2))
+    return out, to.work
 
 
 def decode(

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field, fields
 
-from .container import motn, pose
-from .container.chunks import read
-from .container.file import assemble
+from .container.file import Container, parse
 from .limits import DEFAULT_LIMITS, Budget, Limits
 from .packing import unpack
 
@@ -17,13 +15,15 @@ LEVELS = (
     Limits(
         file_bytes=1 << 24, chunks=1 << 10, side=1 << 12, layers=1 << 6, networks=1 << 2,
         segments=1 << 12, gates=1 << 12, faces=1 << 15, codes=1 << 22, samples=1 << 22,
-        filled=1 << 23, covered=1 << 26, wavefronts=1 << 15, motion=1 << 16, parameters=1 << 16,
+        small_gates=1 << 12, small_codes=1 << 22, small_samples=1 << 22, filled=1 << 23,
+        covered=1 << 26, wavefronts=1 << 15, motion=1 << 16, parameters=1 << 16,
         metadata_bytes=1 << 20, references=1 << 14,
     ),
     Limits(
         file_bytes=1 << 27, chunks=1 << 12, side=1 << 14, layers=1 << 8, networks=1 << 4,
         segments=1 << 14, gates=1 << 14, faces=1 << 17, codes=1 << 24, samples=1 << 24,
-        filled=1 << 25, covered=1 << 29, wavefronts=1 << 16, motion=1 << 20, parameters=1 << 20,
+        small_gates=1 << 14, small_codes=1 << 23, small_samples=1 << 24, filled=1 << 25,
+        covered=1 << 29, wavefronts=1 << 16, motion=1 << 20, parameters=1 << 20,
         metadata_bytes=1 << 24, references=1 << 17,
     ),
     DEFAULT_LIMITS,
@@ -50,6 +50,17 @@ class Usage(Budget):
         super().check(name, value)
         self.counted[name] = max(self.counted.get(name, 0), value)
 
+    @property
+    def level(self) -> int | None:
+        """The lowest level, 1..3, whose limits nothing exceeded; None if there is none."""
+        counted = {name: count for name, count in self.counted.items() if name in COUNTED}
+        levels = (
+            number
+            for number, level in enumerate(LEVELS, 1)
+            if all(count <= getattr(level, name) for name, count in counted.items())
+        )
+        return next(levels, None)
+
 
 def profile_and_level(data: bytes, limits: Limits = DEFAULT_LIMITS) -> tuple[str, int | None]:
     """The lowest profile and level, 1..3, that a file needs; None if it is above all levels.
@@ -64,18 +75,14 @@ def profile_and_level(data: bytes, limits: Limits = DEFAULT_LIMITS) -> tuple[str
         LimitError: It exceeds `limits`.
     """
     usage = Usage(**asdict(limits))
-    chunks = read(data, usage)
-    content = assemble(chunks, usage)
+    content = parse(data, usage)
     for layer in unpack(content, usage).layers:
         if layer.mesh is not None:
             _ = layer.mesh.refined
-    types = {chunk.type for chunk in chunks}
-    posed = pose.TYPE in types or any(v["sampling"] for v in content.layers)
-    profile = PROFILES[2 if motn.TYPE in types else 1 if posed else 0]
-    counted = {name: count for name, count in usage.counted.items() if name in COUNTED}
-    levels = (
-        number
-        for number, level in enumerate(LEVELS, 1)
-        if all(count <= getattr(level, name) for name, count in counted.items())
-    )
-    return profile, next(levels, None)
+    return profile(content), usage.level
+
+
+def profile(c: Container) -> str:
+    """The lowest of `PROFILES` that shows all of a file."""
+    posed = bool(c.poses) or any(v["sampling"] for v in c.layers)
+    return PROFILES[2 if c.motion is not None else 1 if posed else 0]

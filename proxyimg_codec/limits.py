@@ -15,6 +15,10 @@ SAMPLE_COST_BITS = 10
 """A sample of a layer counts as 2**SAMPLE_COST_BITS multiplications."""
 
 
+SMALL_FILE = 1 << 20
+"""Up to this size in bytes a file is small: it may hold less, whose `Limits` begin with `small`."""
+
+
 @dataclass(frozen=True)
 class Limits:
     """Upper bounds for reading and rendering; the defaults suit a desktop program.
@@ -27,12 +31,15 @@ class Limits:
         networks: Decoder networks in a file.
         segments: Bézier segments in all boundaries together.
         gates: Gates of all meshes together: steps of decoding their connectivity.
+        small_gates: The same in a file of at most `SMALL_FILE` bytes.
         faces: Triangles of all refined meshes together.
         overlap: How often, in the mean, the triangles of a deformed layer may cover a sample.
         beyond: Pairs that are compared of a face and a point that no face of a mesh holds, of all
             layers together; and of a face and 48 control points that ride on the mesh.
         codes: Scalar codes of all textures and cells of all masks together, stored or not.
+        small_codes: The same in a file of at most `SMALL_FILE` bytes.
         samples: Raster samples of all planes together.
+        small_samples: The same in a file of at most `SMALL_FILE` bytes.
         filled: Raster samples of all parts that are shown with a mask or cuts, which may have to be
             filled.
         covered: Raster samples of all parts that boundaries cut, once for each of these, and for
@@ -44,8 +51,9 @@ class Limits:
         metadata_bytes: Metadata, history and script together, after decompression.
         references: Chunks of all states of a history together.
         output_pixels: Pixels of one rendered picture.
-        multiply_adds: Multiplications of the networks of one rendered picture, and 2^10 for each
-            sample of each layer and of each triangle.
+        multiply_adds: Multiplications of the networks of one rendered picture, 2^7 for each feature
+            of an anchor that a sample is made of, and 2^10 for each sample of each layer, each
+            triangle, and each sample that it holds.
         work: Edges of boundaries, and their pieces in rows and samples, of one rendered picture.
     """
 
@@ -56,11 +64,14 @@ class Limits:
     networks: int = 64
     segments: int = 1 << 16
     gates: int = 1 << 16
+    small_gates: int = 1 << 15
     faces: int = 1 << 18
     overlap: int = 64
     beyond: int = 1 << 28
     codes: int = 1 << 24
+    small_codes: int = 1 << 23
     samples: int = 1 << 26
+    small_samples: int = 1 << 24
     filled: int = 1 << 27
     covered: int = 1 << 31
     wavefronts: int = 1 << 17
@@ -70,7 +81,7 @@ class Limits:
     references: int = 1 << 20
     output_pixels: int = 1 << 28
     multiply_adds: int = 1 << 43
-    work: int = 1 << 30
+    work: int = 1 << 28
 
     def check(self, name: str, value: int) -> None:
         """Raises `LimitError` if `value` exceeds the limit called `name`."""
@@ -90,6 +101,10 @@ class Limits:
         """
         self.check(name, amount)
 
+    def left(self, name: str) -> int:
+        """How much may still be spent of the limit called `name`."""
+        return int(getattr(self, name))
+
     def budget(self) -> Budget:
         """A budget of which nothing is spent; of a budget itself, what is left of it."""
         return Budget(**{f.name: getattr(self, f.name) for f in fields(Limits)})
@@ -105,10 +120,23 @@ class Budget(Limits):
         """Spends `amount`; see `Limits.spend`."""
         self.spent[name] += amount
         self.check(name, self.spent[name])
+        if 0 < self.spent["file_bytes"] <= SMALL_FILE and name in SMALL:
+            self.check(SMALL[name], self.spent[name])
+
+    def left(self, name: str) -> int:
+        """See `Limits.left`."""
+        return super().left(name) - self.spent[name]
 
     def budget(self) -> Budget:
         """Itself."""
         return self
 
+    def fits_small(self) -> bool:
+        """Whether a small file may hold what was spent."""
+        return all(self.spent[name] <= getattr(self, small) for name, small in SMALL.items())
+
+
+SMALL = {f.name.removeprefix("small_"): f.name for f in fields(Limits) if "small_" in f.name}
+"""The limits of small files, by the limits that they are stricter than."""
 
 DEFAULT_LIMITS = Limits()

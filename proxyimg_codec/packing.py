@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from .container import meta, texr
+from .container.chunks import Chunk
 from .container.fields import pack as packed
 from .container.file import Container
 from .errors import FormatError
@@ -23,6 +24,13 @@ from .texture.cuts import Cuts
 from .texture.implicit import ImplicitTexture
 from .texture.planes import Planes
 from .texture.pyramid import Texture
+
+_PADDING = "paDD"
+
+
+def padding(size: int) -> Chunk:
+    """A chunk of `size` bytes that lengthens a file too small for what it holds (SEC-3)."""
+    return Chunk(_PADDING, bytes(size))
 
 
 def pack(image: Image) -> Container:
@@ -179,7 +187,8 @@ def unpack(c: Container, limits: Limits, damage: tuple[str, ...] = ()) -> Image:
     width, height = c.head["size"]
     return Image(
         width, height, c.head["channels"], bool(c.head["opaque"]), c.head["depth"],
-        Layers(layers), networks, c.blocks, c.info, c.extra,
+        Layers(layers), networks, c.blocks, c.info,
+        tuple(chunk for chunk in c.extra if chunk.type != _PADDING),
         dict(zip(groups, parents[len(c.layers) :], strict=True)), timeline, c.history, damage,
     )  # fmt: skip
 

@@ -9,9 +9,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import asdict
 from functools import partial
 from math import inf, prod
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from .geometry import boundary, warp
 from .geometry import pose as poses
 from .geometry.mesh import Mesh
 from .image import Image, Layer
+from .levels import Usage, profile
 from .limits import DEFAULT_LIMITS, Limits
 from .texture import implicit, network, planes, pyramid
 
@@ -37,22 +39,43 @@ DRAWN = 256
 _END = Chunk("TAIL", b"")
 _NUMBERED = (layr.TYPE, mesh.TYPE, pose.TYPE, netw.TYPE, plan.TYPE, texr.TYPE)
 _REFUSED = (FormatError, UnsupportedError, LimitError)
+_NO_MEMORY = LimitError("there is not enough memory for it")
+
+
+class Report(NamedTuple):
+    """What is known of a file.
+
+    Attributes:
+        issues: What is wrong, and what is odd: errors, then warnings, then notes, each by their
+            place in the file. It is valid if nothing of that is an error.
+        profile: One of `levels.PROFILES`; None if the file is not valid.
+        level: 1..3; None if the file is not valid, or above all levels.
+    """
+
+    issues: list[Issue]
+    profile: str | None
+    level: int | None
 
 
 def validate(data: bytes, limits: Limits = DEFAULT_LIMITS) -> list[Issue]:
-    """What is wrong with a file, and what is odd; it is valid if nothing of that is an error.
+    """What is wrong with a file, and what is odd: `Report.issues` of `report`."""
+    return report(data, limits).issues
+
+
+def report(data: bytes, limits: Limits = DEFAULT_LIMITS) -> Report:
+    """Checks a file.
 
     Args:
         data: The file.
         limits: What exceeds them is an error.
-
-    Returns:
-        Errors, then warnings, then notes, each by their place in the file.
     """
     check = _Check(limits)
     check.file(data)
     order = (ERROR, doubts.WARNING, doubts.NOTE)
-    return sorted(check.issues, key=lambda v: (order.index(v.severity), v.offset or 0))
+    issues = sorted(check.issues, key=lambda v: (order.index(v.severity), v.offset or 0))
+    if check.failed:
+        return Report(issues, None, None)
+    return Report(issues, check.profile, check.usage.level)
 
 
 class _Check:
@@ -60,10 +83,14 @@ class _Check:
 
     Attributes:
         issues: What was found.
+        profile: That of the file, if its chunks fit together.
+        usage: What was spent on the file, without its history.
     """
 
     def __init__(self, limits: Limits) -> None:
         self.issues: list[Issue] = []
+        self.profile: str | None = None
+        self.usage = Usage(**asdict(limits))
         self._limits = limits
         self._offsets: dict[tuple[str, int], int | None] = {}
         # What chunks of the file and its history hold, and what that decodes to, by identity.
@@ -90,24 +117,23 @@ class _Check:
             complete &= not chunk.critical
         content = None
         if complete:
-            budget = self._limits.budget()
-            work = partial(file.assemble, sound, budget, self._values_of)
-            content = self._try(work)
+            content = self._try(partial(file.assemble, sound, self.usage, self._values_of))
         if content is not None:
-            self._streams(content)
-            if not self._failed:
-                self._try(partial(self._picture, content, budget))
+            self.profile = profile(content)
+            self._picture(content)
+            if not self.failed:
                 self.issues += doubts.old((data[8], data[9]))
             self._history(content.history)
 
     @property
-    def _failed(self) -> bool:
+    def failed(self) -> bool:
+        """Whether an error was found."""
         return any(issue.severity == ERROR for issue in self.issues)
 
     def _chunks(self, data: bytes) -> tuple[list[Chunk], dict[int, FormatError]]:
         """All chunks that can be told, and what is wrong with the frames of some."""
         try:
-            return read(data, self._limits), {}
+            return read(data, self.usage), {}
         except _REFUSED as error:
             first = error
         self._intact = False
@@ -150,7 +176,7 @@ class _Check:
         except _REFUSED as error:
             self._report(error, type_, number)
         except MemoryError:
-            self._report(LimitError("there is not enough memory for it"), type_, number)
+            self._report(_NO_MEMORY, type_, number)
         return None
 
     def _values_of(self, chunk: Chunk) -> Values:
@@ -243,14 +269,46 @@ class _Check:
             if None not in sources:
                 self._once(texr.TYPE, i, cost, work, *parts)
 
-    def _picture(self, c: Container, budget: Limits) -> None:
-        """What it takes to show the picture, of what is left, and what is odd about it."""
-        image = packing.unpack(c, budget)
-        self._limits.check("output_pixels", image.width * image.height)
+    def _picture(self, c: Container) -> None:
+        """Decodes all of the picture, and tries what it takes to show it, and what is odd."""
+        try:
+            image = packing.unpack(c, self.usage)
+            for layer in image.layers:
+                if layer.mesh is not None:
+                    _ = layer.mesh.refined
+        except (*_REFUSED, MemoryError) as error:
+            self._streams(c)  # finds all that is wrong, not only what was met first
+            if not self.failed:
+                self._report(error if isinstance(error, PxiError) else _NO_MEMORY)
+            return
+        for number, own in enumerate(image.planes):
+            self._try(partial(getattr, own, "latents"), plan.TYPE, number)
+        self._keep(c, image)
+        if self.failed:
+            return
+        self._try(partial(self._limits.check, "output_pixels", image.width * image.height))
         for i, layer in enumerate(image.layers):
             self._try(partial(self._drawing, image, layer), layr.TYPE, i)
-        if not self._failed:
+        if not self.failed:
             self.issues += doubts.find(image, c, self._place)
+
+    def _keep(self, c: Container, image: Image) -> None:
+        """Keeps what the chunks of the picture decode to, for states of the history."""
+        meshes = [image.layers[v["layer"]].mesh for v in c.meshes]
+        pairs = [
+            *zip(c.layers, [v.boundary for v in image.layers], strict=True),
+            *zip(c.meshes, meshes, strict=True),
+            *zip(c.networks, image.networks, strict=True),
+            *zip(c.planes, image.planes, strict=True),
+        ]
+        self._results |= {(id(values),): own for values, own in pairs}
+        for v, layer in zip(c.textures, image.layers, strict=True):
+            if v["coder"] == texr.IMPLICIT:
+                key = id(v), id(image.networks[v["network"]]), id(layer.sampling == 1)
+                self._results[key] = layer.texture
+            elif v["coder"] == texr.PYRAMID:
+                sources = (image.planes[k] for k in (v["planes"], v["alpha"] - 1) if k >= 0)
+                self._results[id(v), *map(id, sources)] = layer.texture
 
     def _drawing(self, image: Image, layer: Layer) -> None:
         """Tries what bent layers cost, at a small size."""

@@ -7,6 +7,7 @@ import msgpack
 import numpy as np
 import pytest
 
+from fuzz import bombs
 from proxyimg_codec import from_bytes
 from proxyimg_codec.container import file, meta, undo
 from proxyimg_codec.container.chunks import Chunk, read, write
@@ -16,7 +17,7 @@ from proxyimg_codec.errors import FormatError, LimitError
 from proxyimg_codec.geometry.coverage import coverage
 from proxyimg_codec.geometry.warp import barycentric
 from proxyimg_codec.image import Layers
-from proxyimg_codec.limits import DEFAULT_LIMITS, Limits
+from proxyimg_codec.limits import DEFAULT_LIMITS, SMALL_FILE, Limits
 from proxyimg_codec.validate import validate
 from tests import moving
 
@@ -59,6 +60,43 @@ def test_a_budget_adds_up_and_limits_do_not():
     budget.spend("faces", 4)
     with pytest.raises(LimitError, match="faces: 11 exceeds the limit of 10"):
         budget.spend("faces", 1)
+
+
+def lengthened(data, size):
+    """A file of `size` bytes, by a chunk that no reader knows."""
+    *chunks, tail = read(data)
+    return write([*chunks, Chunk("teST", bytes(size - len(data) - 12)), tail])
+
+
+@pytest.mark.parametrize(
+    ("textures", "more", "name"),
+    [
+        ([bombs.view(8192, 4096)], {"planes": (bombs.plan(8192, 4096),)}, "small_samples"),
+        ([bombs.codes(4096, 4096, b"a")], {"networks": (bombs.network(),)}, "small_codes"),
+    ],
+)
+def test_small_files_may_hold_less(textures, more, name):
+    data = bombs.made([bombs.layer()], textures, **more)
+    count = 2 * getattr(DEFAULT_LIMITS, name)
+    small = lengthened(data, SMALL_FILE)
+    with pytest.raises(LimitError, match=f"--limit {name}="):
+        file.parse(small)
+    with pytest.raises(LimitError, match=f"--limit {name}="):
+        file.parse(small, Limits(**{name: count - 1}))
+    file.parse(small, Limits(**{name: count}))
+    file.parse(lengthened(data, SMALL_FILE + 1))
+
+
+def test_what_small_files_may_not_hold_makes_longer_ones():
+    planes = (bombs.plan(8192, 4096),)
+    large = bombs.made([bombs.layer()], [bombs.view(8192, 4096)], planes=planes)
+    image = from_bytes(large, Limits(small_samples=1 << 25))
+    data = image.to_bytes()
+    assert len(data) == SMALL_FILE + 12
+    again = from_bytes(data)
+    assert not again.extra
+    assert again.to_bytes() == data
+    assert not validate(data)
 
 
 def test_metadata_history_and_script_count_together(picture):

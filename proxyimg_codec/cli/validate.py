@@ -13,12 +13,11 @@ from collections import Counter
 from dataclasses import asdict
 from typing import Any
 
+from .. import validate
 from ..doubts import CODES, ERROR, WARNING, Issue
 from ..errors import FormatError, InputError, LimitError, PxiError, UnsupportedError
 from ..files import read_bytes
-from ..levels import profile_and_level
 from ..limits import Limits
-from ..validate import validate
 from .common import add_limits, limits_of, parser, printable, run
 
 RESULTS: dict[str, type[PxiError] | None] = {
@@ -75,15 +74,13 @@ def check(args: argparse.Namespace) -> None:
 
 def report(path: str, limits: Limits) -> dict[str, Any]:
     """What is found in a file, ready for JSON."""
-    data = b""
     try:
-        data = read_bytes(path)
-        issues = validate(data, limits)
+        issues, profile, level = validate.report(read_bytes(path), limits)
     except InputError as error:
         issues = [Issue("", ERROR, str(error), exit_code=error.exit_code)]
+        profile = level = None
     found = {v.exit_code for v in issues}
     result = next(name for name, error in RESULTS.items() if not error or error.exit_code in found)
-    profile, level = profile_and_level(data, limits) if result == "valid" else (None, None)
     return {
         "file": path,
         "result": result,

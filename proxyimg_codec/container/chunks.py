@@ -111,7 +111,7 @@ def read(data: bytes, limits: Limits = DEFAULT_LIMITS) -> list[Chunk]:
         UnsupportedError: Another format version.
         LimitError: Too large or too many chunks.
     """
-    limits.check("file_bytes", len(data))
+    limits.spend("file_bytes", len(data))
     version = _version(data)
     chunks: list[Chunk] = []
     at = PREFIX.size
@@ -155,7 +155,7 @@ def read_damaged(
         UnsupportedError: Another format version.
         LimitError: Too large or too many chunks.
     """
-    limits.check("file_bytes", len(data))
+    limits.spend("file_bytes", len(data))
     version = _version(data)
     chunks: list[Chunk] = []
     wrong: dict[int, bool] = {}

@@ -13,6 +13,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import kernel
 from ..limits import DEFAULT_LIMITS, Limits
 
 Ints = NDArray[np.int64]
@@ -114,7 +115,6 @@ def coverage(
     Raises:
         LimitError: There are too many.
     """
-    cells = np.zeros(height * (width + 2), np.int64)
     corner = np.array([x0 * ONE, y0 * ONE])
     segments = np.concatenate([np.zeros((0, 4, 2), np.int64), *map(_segments, paths)]) - corner
     # What lies above, below or to the right leaves no trace here.
@@ -122,6 +122,12 @@ def coverage(
     near = (high[:, 1] > 0) & (low[:, 1] < height * ONE) & (low[:, 0] < width * ONE)
     segments = segments[near]
     log2 = _log2_chords(segments)
+    if kernel.available():
+        limits.spend("work", int((1 << log2).sum()))
+        out, work = kernel.coverage(segments, log2, width, height, limits.left("work"))
+        limits.spend("work", work)
+        return out
+    cells = np.zeros(height * (width + 2), np.int64)
     for some in _batches(1 << log2, 1 << MAX_LOG2_CHORDS, limits):
         start, end = _chords(segments[some], log2[some])
         for at in _batches(np.abs(end[:, 1] - start[:, 1]) // ONE + 2, height + 1, limits):

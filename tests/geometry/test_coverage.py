@@ -3,7 +3,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from proxyimg_codec import kernel
+from proxyimg_codec.errors import LimitError
 from proxyimg_codec.geometry.coverage import FULL, ONE, coverage, flatten, to_output
+from proxyimg_codec.limits import Limits
 
 K = 0.5522847498
 
@@ -91,3 +94,36 @@ def test_scaling_rounds_half_up(pixels):
 def test_flat_curves_take_few_chords():
     assert len(flatten(rectangle(0, 0, 100, 100))[0]) == 4
     assert 16 <= len(flatten(circle(0, 0, 50))[0]) <= 128
+
+
+def with_numpy(*args, **more):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(kernel, "available", lambda: False)
+        return coverage(*args, **more)
+
+
+@pytest.mark.skipif(not kernel.available(), reason="kernel not compiled")
+@settings(max_examples=150, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([3, 300, 9000, 1 << 20, 1 << 30]))
+def test_the_kernel_does_what_numpy_does(seed, reach):
+    rng = np.random.default_rng(seed)
+    paths = [rng.integers(-reach, reach + 1, (3 * rng.integers(1, 6), 2)) for _ in range(3)]
+    x, y = rng.integers(-20, 30, 2)
+    w, h = rng.integers(1, 40, 2)
+    assert np.array_equal(coverage(paths, x, y, w, h), with_numpy(paths, x, y, w, h))
+
+
+@pytest.mark.skipif(not kernel.available(), reason="kernel not compiled")
+def test_the_kernel_counts_work_as_numpy_does():
+    rng = np.random.default_rng(1)
+    path = rng.integers(-9000, 9000, (30, 2))
+    budgets = Limits().budget(), Limits().budget()
+    coverage([path], 0, 0, 40, 30, budgets[0])
+    with_numpy([path], 0, 0, 40, 30, budgets[1])
+    assert budgets[0].spent == budgets[1].spent
+    work = budgets[0].spent["work"]
+    for compute in (coverage, with_numpy):
+        compute([path], 0, 0, 40, 30, Limits(work=work).budget())
+        for less in (work - 1, work // 2, 1):
+            with pytest.raises(LimitError, match="work"):
+                compute([path], 0, 0, 40, 30, Limits(work=less).budget())

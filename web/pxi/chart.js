@@ -2,6 +2,7 @@
 
 import { REST, identity } from "./chunks.js";
 import { within } from "./errors.js";
+import { SAMPLE_COST } from "./limits.js";
 import { mapped } from "./pose.js";
 
 /** On which side of an edge p lies; exactly the opposite if the edge is turned round (MSH-33). */
@@ -42,11 +43,10 @@ export class Bent {
    * `moves` are displacements in 1/1024 canvas pixel, `places` those of the texture in 1/16; both
    * may be null.
    */
-  constructor(pose, moves, places, mesh, limits) {
+  constructor(pose, moves, places, mesh, budget) {
     const { nodes, faces } = mesh;
-    this.limits = limits;
+    this.budget = budget;
     this.count = faces.length;
-    this.beyond = 0;
     const present = moves ? nodes.map((v, i) => v + moves[i]) : nodes;
     this.present = mapped(pose, present).map((v) => v / 1024);
     this.shown = nodes.map((v, i) => v / 1024 + (places ? places[i] / 16 : 0));
@@ -67,12 +67,15 @@ export class Bent {
   }
 
   /** The first face that holds each sample of a band, or -1. */
-  prepare(band, work) {
+  prepare(band) {
     const { columns, top, bottom, x, y } = band;
     const found = new Int32Array(columns * (bottom - top)).fill(-1);
     const p = this.present;
-    let held = 0;
+    let held = 0; // rows count too, but for one a face
+    this.budget.spend("multiply_adds", SAMPLE_COST * this.faces.length);
     this.faces.forEach(([a, b, c], index) => {
+      const before = held;
+      let rows = 0;
       const [ax, ay, bx, by, cx, cy] = [
         p[2 * a], p[2 * a + 1], p[2 * b], p[2 * b + 1], p[2 * c], p[2 * c + 1]];
       const first = Math.max(Math.floor(band.rowAt(Math.min(ay, by, cy))) - 1, top);
@@ -81,9 +84,9 @@ export class Bent {
         const py = y(row);
         const [low, high] = crossing(py, ax, ay, bx, by, cx, cy);
         if (low > high) continue;
+        rows++;
         const from = Math.max(Math.floor(band.columnAt(low)) - 1, 0);
         const to = Math.min(Math.ceil(band.columnAt(high)) + 1, columns - 1);
-        work.spend(1 + Math.max(to - from, 0));
         for (let column = from; column <= to; column++) {
           const px = x(column);
           const s = side(ax, ay, bx, by, px, py);
@@ -95,22 +98,32 @@ export class Bent {
           if (found[at] < 0) found[at] = index;
         }
       }
+      held += Math.max(rows - 1, 0);
+      this.budget.spend("multiply_adds", SAMPLE_COST * (held - before));
+      within(held / found.length, this.budget.overlap, "overlap");
     });
-    within(held / found.length, this.limits.overlap, "overlap");
     this.faceOf = found;
   }
 
   /** The face whose centroid is nearest to a point. */
   #nearest(x, y) {
-    let [best, least] = [-1, Infinity];
     const p = this.present;
-    this.faces.forEach(([a, b, c], index) => {
-      const dx = (p[2 * a] + p[2 * b] + p[2 * c]) / 3 - x;
-      const dy = (p[2 * a + 1] + p[2 * b + 1] + p[2 * c + 1]) / 3 - y;
-      const square = dx * dx + dy * dy;
-      if (square < least) [best, least] = [index, square];
+    this.centroids ??= Float64Array.from({ length: 2 * this.faces.length }, (_, i) => {
+      const [a, b, c] = this.faces[i >> 1].map((node) => p[2 * node + (i & 1)]);
+      return (a + b + c) / 3;
     });
-    return best;
+    const { centroids } = this;
+    let [best, least] = [-2, Infinity];
+    for (let i = 0; i < centroids.length; i += 2) {
+      const dx = centroids[i] - x;
+      const dy = centroids[i + 1] - y;
+      const square = dx * dx + dy * dy;
+      if (square < least) {
+        best = i;
+        least = square;
+      }
+    }
+    return best / 2;
   }
 
   /** As of Straight; `samples` are positions in the band. Keeps corners and weights of samples. */
@@ -120,7 +133,7 @@ export class Bent {
     this.weights = new Float64Array(3 * xs.length);
     this.corners = new Uint32Array(3 * xs.length);
     const lost = samples.reduce((sum, at) => sum + (this.faceOf[at] < 0), 0);
-    within((this.beyond += lost * this.count), this.limits.beyond, "beyond");
+    this.budget.spend("beyond", lost * this.count);
     for (let i = 0; i < xs.length; i++) {
       const [x, y] = [xs[i], ys[i]];
       let index = this.faceOf[samples[i]];

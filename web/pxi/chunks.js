@@ -266,7 +266,7 @@ function checkLimits({ layers, meshes, networks, textures, motion }, limits) {
   const add = (name, count) => limits.spend(name, count);
   layers.forEach((layr) => layr.segments.forEach((count) => add("segments", count)));
   meshes.forEach((mesh) => add("gates", mesh.gates));
-  if (motion) within(motion.size, limits.metadata_bytes, "metadata_bytes");
+  if (motion) add("metadata_bytes", motion.size);
   for (const netw of networks) {
     const sizes = networkSizes(netw);
     sizes.slice(1).forEach((outputs, i) => add("parameters", outputs * (sizes[i] + 1)));

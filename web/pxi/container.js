@@ -20,7 +20,7 @@ export function crc32(bytes) {
 
 /** All chunks of a file as {kind, payload}, checked up to CON-13. */
 export function readChunks(data, limits) {
-  within(data.length, limits.file_bytes, "file_bytes");
+  limits.spend("file_bytes", data.length);
   need(data.length >= 12, "the file is shorter than its prefix");
   need(SIGNATURE.every((byte, i) => data[i] === byte), "this is not a .pxi file");
   supported(data[8] === 0 && [1, 2, 3, 9].includes(data[9]), `version ${data[8]}.${data[9]}`);

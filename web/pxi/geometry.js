@@ -5,13 +5,12 @@
  */
 
 import { decodeSigned } from "./entropy.js";
-import { need, within } from "./errors.js";
+import { need } from "./errors.js";
 import { clamp, dotDiv, sumDiv } from "./integers.js";
 
 export const FULL = 131072;
 const COORDINATE_MAX = 2 ** 26;
 const SCALED_MAX = 2 ** 30;
-const CHORD_WORK = 16; // how much longer than a sample of a piece a chord takes, about
 
 /** The paths of a LAYR, or null if it covers the canvas. */
 export function decodeBoundary({ segments, classes, deltas }) {
@@ -51,7 +50,7 @@ export function scalePaths(paths, unit, [x0, y0, w, h], columns, rows) {
 }
 
 /** Calls `each(xa, ya, xb, yb)` for the chords of segment k of a path (GEO-8, GEO-9). */
-function flatten(path, k, each) {
+function flatten(path, k, budget, each) {
   const p = [0, 1, 2, 3].map((i) => (k + 2 * i) % path.length);
   const bend = (axis) => {
     const [a, b, c, d] = p.map((i) => path[i + axis]);
@@ -65,6 +64,7 @@ function flatten(path, k, each) {
   const xs = p.map((i) => path[i]);
   const ys = p.map((i) => path[i + 1]);
   let [x, y] = [xs[0], ys[0]];
+  budget.spend("work", n);
   for (let i = 1; i <= n; i++) {
     const j = n - i;
     weights[0] = j * j * j;
@@ -81,12 +81,12 @@ function flatten(path, k, each) {
 /**
  * Coverage 0..FULL of the samples in rows top..bottom - 1 and columns 0..columns - 1.
  *
- * `paths` are in 1/256 sample; `work` counts what was done, and refuses too much.
+ * `paths` are in 1/256 sample; what it takes is taken from `budget` (SEC-11).
  */
-export function coverage(paths, columns, top, bottom, work) {
+export function coverage(paths, columns, top, bottom, budget) {
   const area = new Float64Array(columns * (bottom - top));
   const carry = new Float64Array(area.length); // what goes to all columns from here on
-  const canvas = { area, carry, columns, top, bottom, work };
+  const canvas = { area, carry, columns, top, bottom, budget };
   for (const path of paths) {
     for (let k = 0; k < path.length; k += 6) {
       let [low, high, left] = [Infinity, -Infinity, Infinity];
@@ -98,7 +98,7 @@ export function coverage(paths, columns, top, bottom, work) {
       }
       // Chords stay between their control points; what is right of the samples adds nothing.
       if (low >= 256 * bottom || high <= 256 * top || left >= 256 * columns) continue;
-      flatten(path, k, (xa, ya, xb, yb) => addChord(canvas, xa, ya, xb, yb));
+      flatten(path, k, budget, (xa, ya, xb, yb) => addChord(canvas, xa, ya, xb, yb));
     }
   }
   for (let at = 0; at < area.length; at += columns) {
@@ -113,59 +113,38 @@ export function coverage(paths, columns, top, bottom, work) {
 
 /** GEO-11 and GEO-12. */
 function addChord(canvas, xa, ya, xb, yb) {
-  canvas.work.spend(CHORD_WORK);
   if (ya === yb) return;
   const sign = ya < yb ? 1 : -1;
   if (sign < 0) [xa, ya, xb, yb] = [xb, yb, xa, ya];
   const first = Math.max(Math.floor(ya / 256), canvas.top);
   const last = Math.min(Math.floor((yb - 1) / 256), canvas.bottom - 1);
   const at = (y) => xa + dotDiv(y - ya, xb - xa, 0, 0, 0, yb - ya);
+  let pieces = 0;
   for (let row = first; row <= last; row++) {
     const yIn = Math.max(ya, 256 * row);
     const yOut = Math.min(yb, 256 * row + 256);
     const [xIn, xOut] = [at(yIn), at(yOut)];
-    addPiece(canvas, row, Math.min(xIn, xOut), Math.max(xIn, xOut), yOut - yIn, sign);
+    pieces += addPiece(canvas, row, Math.min(xIn, xOut), Math.max(xIn, xOut), yOut - yIn, sign);
   }
+  if (pieces) canvas.budget.spend("work", pieces);
 }
 
-/** GEO-13. */
-function addPiece({ area, carry, columns, top, work }, row, left, right, rise, sign) {
+/** GEO-13; what the piece counts as: itself, and its samples but one. */
+function addPiece({ area, carry, columns, top }, row, left, right, rise, sign) {
   const at = (row - top) * columns;
   const first = Math.max(Math.floor(left / 256), 0);
   const last = Math.min(Math.floor(right / 256), columns - 1);
   const climbed = (x) =>
     x <= left ? 0 : x >= right ? rise : Math.floor(((x - left) * rise) / (right - left));
-  work.spend(1 + Math.max(last - first, 0));
+  let before = climbed(256 * first);
   for (let c = first; c <= last; c++) {
     const low = 256 * c;
-    const before = climbed(low);
+    const after = climbed(low + 256);
     const mean2 = Math.max(left, low) + Math.min(right, low + 256) - 2 * low;
-    area[at + c] += sign * (512 * before + (climbed(low + 256) - before) * (512 - mean2));
+    area[at + c] += sign * (512 * before + (after - before) * (512 - mean2));
+    before = after;
   }
   const next = Math.max(last + 1, first);
   if (next < columns) carry[at + next] += 512 * sign * rise;
+  return 1 + Math.max(last - first, 0);
 }
-
-/** What may be spent on one picture that is drawn (SEC-11). */
-export class Work {
-  constructor(limits) {
-    this.left = limits.work;
-    this.limit = limits.work;
-    this.multiplied = 0;
-    this.multiply_adds = limits.multiply_adds;
-  }
-
-  /** Edges and their pieces. */
-  spend(steps) {
-    this.left -= steps;
-    if (this.left < 0) within(this.limit - this.left, this.limit, "work");
-  }
-
-  /** Multiplications of networks, and SAMPLE_COST for each sample of a layer. */
-  multiply(count) {
-    within((this.multiplied += count), this.multiply_adds, "multiply_adds");
-  }
-}
-
-/** What a sample of a layer counts as. */
-export const SAMPLE_COST = 2 ** 10;

@@ -118,12 +118,12 @@ class Rider {
     const bits = extent ? Math.floor(Math.log2(extent)) + 1 : 0; // exact: extents are below 2^36
     this.scale = 2 ** Math.max(bits - GRID_BITS, 0);
     this.grid = nodes.map((v, i) => Math.floor((v - this.low[i & 1]) / this.scale));
+    this.strip = 2 ** Math.max(Math.min(bits, GRID_BITS) - 7, 0);
     this.#sortIntoStrips();
   }
 
   /** Faces by strips of rows, so that few need to be looked at. */
   #sortIntoStrips() {
-    this.strip = 2 ** (GRID_BITS - 7);
     this.strips = Array.from({ length: 129 }, () => []);
     for (const face of this.faces) {
       const ys = face.map((i) => this.grid[2 * i + 1]);
@@ -140,8 +140,8 @@ class Rider {
     return (grid[2 * b] - ax) * (y - ay) - (grid[2 * b + 1] - ay) * (x - ax);
   }
 
-  /** MSH-27. */
-  #face(x, y) {
+  /** The face that holds a point, or null (MSH-27). */
+  #holding(x, y) {
     const near = this.strips[Math.floor(y / this.strip)] ?? [];
     this.#spend(near.length / 4);
     for (const face of near) {
@@ -150,16 +150,25 @@ class Rider {
         return face;
       }
     }
-    this.#spend(this.faces.length);
-    let [best, least] = [null, Infinity];
-    for (const face of this.faces) {
-      const [a, b, c] = face;
-      const dx = this.grid[2 * a] + this.grid[2 * b] + this.grid[2 * c] - 3 * x;
-      const dy = this.grid[2 * a + 1] + this.grid[2 * b + 1] + this.grid[2 * c + 1] - 3 * y;
+    return null;
+  }
+
+  /** The face that is nearest to a point which no face holds (MSH-27). */
+  #nearest(x, y) {
+    this.sums ??= Float64Array.from({ length: 2 * this.faces.length }, (_, i) =>
+      this.faces[i >> 1].reduce((sum, node) => sum + this.grid[2 * node + (i & 1)], 0));
+    const { sums } = this;
+    let [best, least] = [0, Infinity];
+    for (let i = 0; i < sums.length; i += 2) {
+      const dx = sums[i] - 3 * x;
+      const dy = sums[i + 1] - 3 * y;
       const square = dx * dx + dy * dy;
-      if (square < least) [best, least] = [face, square];
+      if (square < least) {
+        best = i;
+        least = square;
+      }
     }
-    return best;
+    return this.faces[best / 2];
   }
 
   #spend(count) {
@@ -172,9 +181,13 @@ class Rider {
     const out = new Float64Array(points.length);
     const small = (v, axis) =>
       clamp(Math.floor((v - this.low[axis]) / this.scale), -(2 ** GRID_BITS), 2 ** (GRID_BITS + 1));
+    const at = points.map((v, i) => small(v, i & 1));
+    const holding = Array.from({ length: at.length / 2 }, (_, i) =>
+      this.#holding(at[2 * i], at[2 * i + 1]));
+    this.#spend(holding.filter((face) => !face).length * this.faces.length);
     for (let i = 0; i < points.length; i += 2) {
-      const [x, y] = [small(points[i], 0), small(points[i + 1], 1)];
-      const face = this.#face(x, y);
+      const [x, y] = [at[i], at[i + 1]];
+      const face = holding[i / 2] ?? this.#nearest(x, y);
       const [a, b, c] = face;
       const whole = Math.max(this.#side(a, b, this.grid[2 * c], this.grid[2 * c + 1]), 1);
       const share = (side) =>

@@ -1,9 +1,9 @@
 /** Chapter 9: from layers to pixels. */
 
 import { Bent, Straight } from "./chart.js";
-import { within } from "./errors.js";
-import { FULL, SAMPLE_COST, Work, coverage, scalePaths } from "./geometry.js";
+import { FULL, coverage, scalePaths } from "./geometry.js";
 import { anchors, featuresAt, featuresOf, globalFeature, runNetwork } from "./implicit.js";
+import { ANCHOR_COST, Budget, SAMPLE_COST } from "./limits.js";
 import { outline } from "./pose.js";
 import { sampleView } from "./view.js";
 
@@ -22,20 +22,22 @@ export function render(image, options = {}) {
   const region = options.region ?? [0, 0, image.width, image.height];
   const width = options.width ?? region[2];
   const height = options.height ?? region[3];
-  within(width * height, image.limits.output_pixels, "output_pixels");
+  const budget = new Budget(image.limits);
+  budget.spend("output_pixels", width * height);
   const still = image.names.flatMap(({ hidden }, k) => (hidden ? [] : [k]));
   const drawn = options.drawn ?? still;
   const moves = image.motion && options.time != null ? image.motion.at(options.time) : new Map();
   const view = viewOf(region, width, height);
-  const work = new Work(image.limits);
-  const sheets = [...drawn].sort((a, b) => b - a).map((n) => new Sheet(image, n, moves, view));
+  budget.spend("multiply_adds", drawn.length * view.columns * view.rows * SAMPLE_COST);
+  const order = [...drawn].sort((a, b) => b - a);
+  const sheets = order.map((n) => new Sheet(image, n, moves, view, budget));
   const opaque = image.head.opaque && drawn.includes(0);
   const channels = opaque ? 3 : 4;
   const data = new Float32Array(width * height * channels);
   const step = Math.max(1, Math.floor(BAND / (view.columns * view.sy)));
   for (let y = 0; y < height; y += step) {
     const band = bandOf(view, y * view.sy, Math.min(y + step, height) * view.sy);
-    average(view, band, composite(sheets, band, work), channels, data);
+    average(view, band, composite(sheets, band), channels, data);
   }
   return { width, height, channels, data };
 }
@@ -59,16 +61,16 @@ function bandOf({ region: [x0, y0, w, h], columns, rows }, top, bottom) {
 }
 
 /** Colour and alpha of the samples of a band [samples, 4] (REN-7). */
-function composite(sheets, band, work) {
+function composite(sheets, band) {
   const size = band.columns * (band.bottom - band.top);
   const result = new Float64Array(4 * size);
   const clear = new Float64Array(size).fill(1);
   for (const sheet of sheets) {
-    const cover = sheet.coverage(band, work);
+    const cover = sheet.coverage(band);
     const samples = [];
     for (let i = 0; i < size; i++) if (clear[i] > 0 && (!cover || cover[i] > 0)) samples.push(i);
     if (!samples.length) continue;
-    const colours = sheet.colours(band, samples, work);
+    const colours = sheet.colours(band, samples);
     samples.forEach((i, k) => {
       const share = cover ? cover[i] / FULL : 1;
       for (let c = 0; c < 4; c++) result[4 * i + c] += clear[i] * share * colours[4 * k + c];
@@ -99,8 +101,8 @@ function average({ width, sx, sy, columns }, { top, bottom }, samples, channels,
 
 /** One layer in one view. */
 class Sheet {
-  constructor(image, n, moves, view) {
-    Object.assign(this, { image, n });
+  constructor(image, n, moves, view, budget) {
+    Object.assign(this, { image, n, budget });
     this.layr = image.layers[n];
     this.pose = image.pose(n);
     this.mesh = image.meshes.get(n);
@@ -110,33 +112,30 @@ class Sheet {
     const places = image.places.get(n) ?? null;
     const { paths, unit } = outline(
       image.boundaries[n], this.layr.unit, image.head.size, this.pose, shifts, this.mesh,
-      image.limits);
+      budget);
     this.paths = paths && scalePaths(paths, unit, view.region, view.columns, view.rows);
     const consulted = shifts || places || [1, 2].includes(this.layr.sampling);
     this.chart = consulted
-      ? new Bent(this.pose, shifts, places, this.mesh, image.limits)
+      ? new Bent(this.pose, shifts, places, this.mesh, budget)
       : new Straight(this.pose);
-    const { layers } = image.networks[this.texr.network] ?? { layers: [] };
-    this.cost = layers.reduce((sum, v) => sum + (v.inputs + 1) * v.outputs, 0);
     this.paint = this.texr.coder === 2 ? this.#ofView(moves.size > 0) : this.#ofPlane();
   }
 
   /** Coverage of the samples of a band, or null if all are covered. */
-  coverage({ columns, top, bottom }, work) {
-    return this.paths && coverage(this.paths, columns, top, bottom, work);
+  coverage({ columns, top, bottom }) {
+    return this.paths && coverage(this.paths, columns, top, bottom, this.budget);
   }
 
   /** Premultiplied colour and alpha of some samples of a band (REN-6). */
-  colours(band, samples, work) {
+  colours(band, samples) {
     const count = samples.length;
-    work.multiply(count * (SAMPLE_COST + this.cost));
     const [xs, ys, us, vs] = [0, 1, 2, 3].map(() => new Float64Array(count));
     samples.forEach((i, k) => {
       const row = Math.floor(i / band.columns);
       xs[k] = band.x(i - row * band.columns);
       ys[k] = band.y(band.top + row);
     });
-    this.chart.prepare?.(band, work);
+    this.chart.prepare?.(band);
     this.chart.locate(samples, xs, ys, us, vs);
     const out = new Float64Array(4 * count);
     this.paint(us, vs, out);
@@ -154,20 +153,31 @@ class Sheet {
   #ofPlane() {
     const plane = this.image.plane(this.source);
     const network = this.image.networks[this.texr.network];
+    const points = this.#anchors();
     const features = this.layr.sampling
-      ? this.#nodeFeatures(plane)
+      ? this.#nodeFeatures(plane, points)
       : (u, v, i, point) => featuresAt(plane, this.layr.box, u, v, point, 0);
-    return (us, vs, out) =>
+    const weights = network.layers.reduce((sum, v) => sum + (v.inputs + 1) * v.outputs, 0);
+    const cost = weights + ((points?.length ?? 0) / 2) * plane.dim * ANCHOR_COST;
+    return (us, vs, out) => {
+      this.budget.spend("multiply_adds", us.length * cost);
       runNetwork(network, us.length, (i, point) => features(us[i], vs[i], i, point), out);
+    };
+  }
+
+  /** The anchors of a layer with a global feature, else null. */
+  #anchors() {
+    const { image, layr } = this;
+    const global = [1, 3].includes(layr.sampling);
+    return global ? anchors(image.boundaries[this.n], layr.unit, image.head.size) : null;
   }
 
   /** The input of the network for node sampling (TEX-20 to TEX-23). */
-  #nodeFeatures(plane) {
-    const { sampling, box, unit } = this.layr;
-    const { image, mesh, chart } = this;
+  #nodeFeatures(plane, points) {
+    const { sampling, box } = this.layr;
+    const { mesh, chart } = this;
     const { dim } = plane;
     const nodes = sampling !== 3 ? featuresOf(plane, box, mesh.nodes.map((v) => v / 1024)) : null;
-    const points = sampling !== 2 ? anchors(image.boundaries[this.n], unit, image.head.size) : null;
     const there = points && featuresOf(plane, box, points);
     return (u, v, i, point) => {
       point.fill(0);

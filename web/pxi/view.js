@@ -2,7 +2,8 @@
 
 import { REST } from "./chunks.js";
 import { decodeMask } from "./entropy.js";
-import { FULL, Work, coverage, scalePaths } from "./geometry.js";
+import { FULL, coverage, scalePaths } from "./geometry.js";
+import { Budget } from "./limits.js";
 import { Diffusion } from "./implicit.js";
 import { clamp } from "./integers.js";
 
@@ -59,7 +60,7 @@ function masksOf(scene, n, k) {
     const [left, top] = layers[k].box;
     const paths = scalePaths(scene.boundaries[c], layers[c].unit, [0, 0, 1, 1], 1, 1).map((path) =>
       path.map((p, i) => p - 256 * (i & 1 ? top : left)));
-    return coverage(paths, w, 0, h, new Work(limits));
+    return coverage(paths, w, 0, h, new Budget(limits));
   };
   const behind = cuts[0] === k ? bareBehind(scene, n, k, covered, w * h) : null;
   const some = new Uint8Array(w * h);
