@@ -182,8 +182,11 @@ def _confine() -> None:
 
 
 def limit_memory() -> None:
-    """Caps what this process may hold at `MEMORY`."""
-    for what, most in ((resource.RLIMIT_DATA, MEMORY), (resource.RLIMIT_CORE, 0)):
+    """Caps what this process may hold, beyond what it does already, at `MEMORY`."""
+    held = Path("/proc/self/statm")
+    pages = int(held.read_text().split()[5]) if held.exists() else 0
+    data = MEMORY + pages * resource.getpagesize()
+    for what, most in ((resource.RLIMIT_DATA, data), (resource.RLIMIT_CORE, 0)):
         hard = resource.getrlimit(what)[1]
         most = most if hard == resource.RLIM_INFINITY else min(most, hard)
         resource.setrlimit(what, (most, most))
