@@ -94,7 +94,7 @@ def forked(work: Callable[[io.TextIOBase], None]) -> tuple[list[str], int]:
                 with open(target, "w", encoding="utf-8", buffering=1) as out:
                     work(out)
                 status = 0
-            except BaseException:
+            except BaseException:  # the process ends here, whatever it was
                 traceback.print_exc()
             finally:
                 os._exit(status)

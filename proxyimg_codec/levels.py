@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field, fields
 
 from .container.file import Container, parse
+from .image import Image
 from .limits import DEFAULT_LIMITS, Budget, Limits
 from .packing import unpack
 
@@ -76,10 +77,21 @@ def profile_and_level(data: bytes, limits: Limits = DEFAULT_LIMITS) -> tuple[str
     """
     usage = Usage(**asdict(limits))
     content = parse(data, usage)
-    for layer in unpack(content, usage).layers:
+    refined(content, usage)
+    return profile(content), usage.level
+
+
+def refined(c: Container, usage: Usage) -> Image:
+    """The picture of a parsed file, with its meshes, so that all that makes its level is counted.
+
+    Raises:
+        FormatError, UnsupportedError, LimitError: As `profile_and_level`.
+    """
+    image = unpack(c, usage)
+    for layer in image.layers:
         if layer.mesh is not None:
             _ = layer.mesh.refined
-    return profile(content), usage.level
+    return image
 
 
 def profile(c: Container) -> str:

@@ -26,7 +26,7 @@ from .geometry import boundary, warp
 from .geometry import pose as poses
 from .geometry.mesh import Mesh
 from .image import Image, Layer
-from .levels import Usage, profile
+from .levels import Usage, profile, refined
 from .limits import DEFAULT_LIMITS, Limits
 from .texture import implicit, network, planes, pyramid
 
@@ -272,10 +272,7 @@ class _Check:
     def _picture(self, c: Container) -> None:
         """Decodes all of the picture, and tries what it takes to show it, and what is odd."""
         try:
-            image = packing.unpack(c, self.usage)
-            for layer in image.layers:
-                if layer.mesh is not None:
-                    _ = layer.mesh.refined
+            image = refined(c, self.usage)
         except (*_REFUSED, MemoryError) as error:
             self._streams(c)  # finds all that is wrong, not only what was met first
             if not self.failed:
