@@ -5,7 +5,7 @@ PHOTO := docs/images/photo.png
 
 .PHONY: demo test lint bench clean
 
-.venv/ready: pyproject.toml constraints.txt setup.py proxyimg_codec/_kernel.cpp $(wildcard proxyimg_codec/_kernel_*.h)
+.venv/ready: pyproject.toml constraints.txt setup.py $(wildcard proxyimg_codec/native/*.cpp proxyimg_codec/native/*.h)
 	$(PYTHON) -m venv .venv
 	$(BIN)/pip install --quiet -c constraints.txt setuptools
 	$(BIN)/pip install --quiet -c constraints.txt -e '.[dev]'
@@ -32,4 +32,4 @@ bench: .venv/ready
 	$(BIN)/python -m benchmarks.figures $(DATA)
 
 clean:
-	rm -rf .venv tests/web/node_modules demo build *.egg-info proxyimg_codec/_kernel*.so
+	rm -rf .venv tests/web/node_modules demo build *.egg-info proxyimg_codec/native/_kernel*.so

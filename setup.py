@@ -17,9 +17,9 @@ else:
 setup(
     ext_modules=[
         Extension(
-            "proxyimg_codec._kernel",
-            ["proxyimg_codec/_kernel.cpp"],
-            depends=sorted(glob.glob("proxyimg_codec/_kernel_*.h")),
+            "proxyimg_codec.native._kernel",
+            ["proxyimg_codec/native/kernel.cpp"],
+            depends=sorted(glob.glob("proxyimg_codec/native/*.h")),
             extra_compile_args=flags,
             extra_link_args=link,
             optional=True,

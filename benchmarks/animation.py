@@ -24,14 +24,15 @@ import proxyimg_codec as pxi
 from benchmarks import consistency
 from benchmarks.common import Pixels, header, run_limited
 from benchmarks.editing import PICTURE, regions
-from proxyimg_codec import kernel, pictures
 from proxyimg_codec.animate.animate import amplitude, preset
 from proxyimg_codec.animate.motion import PRESETS
 from proxyimg_codec.animate.sequence import frames, times
-from proxyimg_codec.edit.geometry import meshed
-from proxyimg_codec.encoder.masks import Region
+from proxyimg_codec.edit.transforms import meshed
+from proxyimg_codec.encoder.shapes.masks import Region
 from proxyimg_codec.export.clip import write_clip
 from proxyimg_codec.image import Image, Layers
+from proxyimg_codec.io import raster
+from proxyimg_codec.native import kernel
 
 EMOJI = "emoji_fluent3d_1f98a.webp"
 SIDE, CORNER = 240, (136, 264)
@@ -52,7 +53,7 @@ def scene(data: Path) -> tuple[Pixels, list[Region]]:
     import cv2
 
     pixels, masks = regions(data, PICTURE)
-    emoji = pictures.read(data / "emoji" / EMOJI).pixels
+    emoji = raster.read(data / "emoji" / EMOJI).pixels
     emoji = cv2.resize(emoji, (SIDE, SIDE), interpolation=cv2.INTER_AREA).astype(float)
     (x, y), alpha = CORNER, emoji[..., 3:] / 255
     part = pixels[y : y + SIDE, x : x + SIDE]

@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.common import Pixels, header, kodak, read_rgb
-from proxyimg_codec import pictures
 from proxyimg_codec.encoder.encode import encode
-from proxyimg_codec.encoder.masks import Region
+from proxyimg_codec.encoder.shapes.masks import Region
 from proxyimg_codec.image import Image
+from proxyimg_codec.io import raster
 
 WIDTH, HEIGHT = 384, 256
 BAND = 6
@@ -40,7 +40,7 @@ def sprites(data: Path) -> Iterator[tuple[str, Pixels]]:
     """Name and RGBA of sprites that cover a fifth of their picture or more, kind after kind."""
     kinds = [sorted(data.glob(pattern)) for pattern in SPRITES]
     for path in (p for row in zip_longest(*kinds) for p in row if p is not None):
-        pixels = pictures.read(path).pixels
+        pixels = raster.read(path).pixels
         if pixels.shape[2] == 4 and (pixels[..., 3] > 127).mean() > 0.2:
             yield path.stem, pixels
 
@@ -126,7 +126,7 @@ def run(
             )
         if folder:
             row = np.hstack([photo, mixed, *filled.values()])
-            pictures.write(folder / f"{i:02d}-{name}.png", row)
+            raster.write(folder / f"{i:02d}-{name}.png", row)
     report(scores, sizes)
 
 

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from proxyimg_codec import pictures
 from proxyimg_codec.bench.rd import machine
+from proxyimg_codec.io import raster
 
 Pixels = NDArray[Any]
 
@@ -42,7 +42,7 @@ def kodak(data: Path) -> list[Path]:
 
 def read_rgb(path: Path) -> Pixels:
     """uint8 [H, W, 3]."""
-    return np.ascontiguousarray(pictures.read(path).pixels[..., :3])
+    return np.ascontiguousarray(raster.read(path).pixels[..., :3])
 
 
 def centre_crop(pixels: Pixels, size: int = 512) -> Pixels:

@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.common import header
-from proxyimg_codec import pictures
 from proxyimg_codec.edit import deform
 from proxyimg_codec.edit.deform import Complex, Index, Real
 from proxyimg_codec.edit.deform import _Body as Body
+from proxyimg_codec.io import raster
 
 Inside = Callable[[Complex], NDArray[np.bool_]]
 Method = Callable[[Complex, Index, Complex, Complex], Complex]
@@ -70,7 +70,7 @@ def meshes(count: int, data: Path | None) -> Iterator[tuple[Complex, Index]]:
     """A mesh of about `count` nodes for each shape."""
     shapes = list(SILHOUETTES.values())
     for path in sorted((data / "clipart").glob("*.png"))[:3] if data else []:
-        alpha = pictures.read(path).pixels[..., 3] > 127
+        alpha = raster.read(path).pixels[..., 3] > 127
         shapes.append((complex(*alpha.shape[::-1]), _within(alpha)))
     for size, inside in shapes:
         pitch = abs(size) / 20

@@ -15,9 +15,9 @@ import numpy as np
 
 import proxyimg_codec as pxi
 from benchmarks.common import read_rgb
-from proxyimg_codec import pictures
-from proxyimg_codec.encoder.masks import Region
+from proxyimg_codec.encoder.shapes.masks import Region
 from proxyimg_codec.image import Image
+from proxyimg_codec.io import raster
 
 SCRIPTS: tuple[list[dict[str, object]], ...] = (
     [{"op": "move", "layer": "red", "by": [-60, 20]}],
@@ -72,7 +72,7 @@ def main() -> None:
         half = cv2.resize(pixels, None, fx=2 / 3, fy=2 / 3, interpolation=cv2.INTER_AREA)
         shots.append(half)
     rows = [np.concatenate(shots[i : i + 2], axis=1) for i in range(0, len(shots), 2)]
-    pictures.write(args.output, np.concatenate(rows), {})
+    raster.write(args.output, np.concatenate(rows), {})
 
 
 if __name__ == "__main__":

@@ -15,12 +15,12 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.common import Pixels, centre_crop, header, kodak, read_rgb, run_limited
-from proxyimg_codec.encoder import fit
 from proxyimg_codec.encoder.encode import encode, to_float
-from proxyimg_codec.encoder.masks import load_masks
-from proxyimg_codec.encoder.problem import build
+from proxyimg_codec.encoder.implicit import fit
+from proxyimg_codec.encoder.implicit.fit_problem import build
 from proxyimg_codec.encoder.settings import Settings
-from proxyimg_codec.quality import psnr_8bit
+from proxyimg_codec.encoder.shapes.masks import load_masks
+from proxyimg_codec.io.psnr import psnr_8bit
 from proxyimg_codec.texture.network import NetShape, encode_features
 
 FLOAT_SHAPE = NetShape(8, 6, 32, 2, 3)
@@ -45,7 +45,7 @@ def fit_float(pixels: Pixels, steps: int) -> tuple[float, int, float]:
 
 def evaluate(problem: object, state: fit.State) -> Pixels:
     """Unquantized output [pixels, 3] of a problem with one layer, in numpy."""
-    from proxyimg_codec.encoder.problem import Problem
+    from proxyimg_codec.encoder.implicit.fit_problem import Problem
 
     assert isinstance(problem, Problem)
     out = []

@@ -12,9 +12,9 @@ import cv2
 import numpy as np
 
 from benchmarks.common import Pixels, read_rgb
-from proxyimg_codec import pictures
 from proxyimg_codec.encoder.encode import encode
-from proxyimg_codec.encoder.masks import load_masks
+from proxyimg_codec.encoder.shapes.masks import load_masks
+from proxyimg_codec.io import raster
 
 PHOTO = Path(__file__).parents[1] / "docs" / "images" / "photo.png"
 DETAIL = (380, 90, 180, 120)
@@ -52,7 +52,7 @@ def main() -> None:
         cv2.copyMakeBorder(p, 0, GAP, 0, GAP, cv2.BORDER_CONSTANT, value=(255, 255, 255))
         for p in small
     ]
-    pictures.write(out, np.vstack([np.hstack(framed[:3]), np.hstack(framed[3:])]))
+    raster.write(out, np.vstack([np.hstack(framed[:3]), np.hstack(framed[3:])]))
     print(f"{out}: from a file of {len(image.to_bytes())} bytes")
 
 

@@ -23,14 +23,14 @@ import numpy as np
 
 from benchmarks.common import Pixels, centre_crop, header, kodak, read_rgb
 from benchmarks.figures import fit_float
-from proxyimg_codec.encoder import fit_node, node
 from proxyimg_codec.encoder.encode import encode, to_float
-from proxyimg_codec.encoder.layers import Plan, plan_layers
-from proxyimg_codec.encoder.meshes import with_meshes
-from proxyimg_codec.encoder.node import NodeOptions, NodeProblem
-from proxyimg_codec.encoder.problem import Problem, build
+from proxyimg_codec.encoder.implicit import fit_node, node_problem
+from proxyimg_codec.encoder.implicit.fit_problem import Problem, build
+from proxyimg_codec.encoder.implicit.node_problem import NodeOptions, NodeProblem
 from proxyimg_codec.encoder.settings import PRESETS, Settings
-from proxyimg_codec.quality import psnr_8bit
+from proxyimg_codec.encoder.shapes.layers import Plan, plan_layers
+from proxyimg_codec.encoder.shapes.meshes import with_meshes
+from proxyimg_codec.io.psnr import psnr_8bit
 from proxyimg_codec.texture.network import NetShape
 
 PAPER_CODES, PAPER_PARAMETERS, PAPER_PSNR = 263, 59955, 36.99
@@ -89,7 +89,7 @@ class Case:
     def problem(self, options: NodeOptions) -> NodeProblem:
         """The problem of node sampling."""
         size = (self.pixels.shape[1], self.pixels.shape[0])
-        return node.build(self.start, self.plan.layers, size, options)
+        return node_problem.build(self.start, self.plan.layers, size, options)
 
     def codes(self, cell: float) -> int:
         """Codes of all planes with cells of that size."""

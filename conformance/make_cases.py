@@ -21,10 +21,12 @@ from unittest import mock
 
 import numpy as np
 
-from proxyimg_codec import errors, kernel, levels
+from proxyimg_codec import errors
+from proxyimg_codec.codec import levels
 from proxyimg_codec.container import chunks, layr, motn, pose
 from proxyimg_codec.image import from_bytes
-from proxyimg_codec.pictures import encode_png
+from proxyimg_codec.io.raster import encode_png
+from proxyimg_codec.native import kernel
 
 from . import (
     bent,

@@ -57,7 +57,8 @@ def cases() -> list[Case]:
 
 def _make(place: Path, say: Callable[[str], None]) -> None:
     """Writes all cases into a folder."""
-    from proxyimg_codec import errors, kernel
+    from proxyimg_codec import errors
+    from proxyimg_codec.native import kernel
 
     limit_memory()
     signal.signal(signal.SIGPROF, _too_slow)
@@ -95,7 +96,7 @@ def _expected(target: Path, data: bytes, dice: random.Random | None) -> dict[str
         MemoryError: It is too large to try all mutants on it.
     """
     from proxyimg_codec.image import from_bytes
-    from proxyimg_codec.pictures import encode_png
+    from proxyimg_codec.io.raster import encode_png
 
     from .symbols import digest
 
@@ -152,7 +153,7 @@ def _files(dice: random.Random) -> Iterator[tuple[str, bytes]]:
 def _encoded() -> Iterator[tuple[str, Any]]:
     """Small pictures encoded in several ways."""
     import proxyimg_codec as pxi
-    from proxyimg_codec.pictures import read
+    from proxyimg_codec.io.raster import read
 
     photo = read(PHOTO).pixels
     top, left = photo.shape[0] // 3, photo.shape[1] // 3

@@ -18,12 +18,13 @@ from unittest.mock import patch
 import msgpack
 import numpy as np
 
-from proxyimg_codec import image, pictures
+from proxyimg_codec import image
 from proxyimg_codec.cli import decode
 from proxyimg_codec.container import chunks, fields, file
 from proxyimg_codec.entropy import arrays, rans
 from proxyimg_codec.errors import FormatError
 from proxyimg_codec.geometry import coverage, deltas
+from proxyimg_codec.io import raster
 from proxyimg_codec.render import compose, view
 from proxyimg_codec.texture import diffusion, implicit, network
 
@@ -131,7 +132,7 @@ def _obliging(argv: list[str]) -> int:
 
 
 coverage_of, taps_of, read_of = coverage.coverage, implicit.taps, chunks.read
-finish_of, write_of, fields_of, main_of = image._finish, pictures.write, fields.unpack, decode.main
+finish_of, write_of, fields_of, main_of = image._finish, raster.write, fields.unpack, decode.main
 premultiplied_of, render_of, select_of = compose.premultiplied, compose.render, image.Image._select
 
 _Coverage = Callable[..., Any]
@@ -170,12 +171,12 @@ FAULTS: dict[str, list[Patch]] = {
         select_of(self, None, background))],
     "ignores-region": [(decode, "parse_region", lambda text: None)],
     "no-halving": [(arrays, "COUNT_LIMIT", 1 << 30)],
-    "nan": [(pictures, "write", _writing_nan)],
-    "one-row-short": [(pictures, "write", lambda path, p, *a: write_of(path, p[:-1], *a))],
-    "eight-bit": [(pictures, "write", lambda path, p, *a:
+    "nan": [(raster, "write", _writing_nan)],
+    "one-row-short": [(raster, "write", lambda path, p, *a: write_of(path, p[:-1], *a))],
+    "eight-bit": [(raster, "write", lambda path, p, *a:
         write_of(path, (p >> 8).astype(np.uint8), *a))],
-    "writes-nothing": [(pictures, "write", lambda *a: None)],
-    "writes-rubbish": [(pictures, "write", lambda path, *a: Path(path).write_bytes(b"rubbish"))],
+    "writes-nothing": [(raster, "write", lambda *a: None)],
+    "writes-rubbish": [(raster, "write", lambda path, *a: Path(path).write_bytes(b"rubbish"))],
     "accepts-bad-crc": [(chunks, "zlib", types.SimpleNamespace(crc32=lambda data: Anything()))],
     "accepts-trailing-bytes": [(file, "read", _no_trailing)],
     "ignores-critical-chunks": [(chunks.Chunk, "critical", False)],

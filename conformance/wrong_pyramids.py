@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from proxyimg_codec import kernel
 from proxyimg_codec.entropy import laplace
 from proxyimg_codec.geometry.pose import Pose
+from proxyimg_codec.native import kernel
 from proxyimg_codec.render import compose
-from proxyimg_codec.texture import context, cuts, model, planes, pyramid, synthesis
+from proxyimg_codec.texture import context, cuts, planes, pyramid, registered_model, synthesis
 from proxyimg_codec.texture.context import LevelCoder
 from proxyimg_codec.texture.cuts import GONE, NOTHING, Apart, Cuts
 from proxyimg_codec.texture.pyramid import PyramidTexture
@@ -156,8 +156,8 @@ unpack_of, premultiplied_of = pyramid.unpack, compose.premultiplied
 apart_of = Cuts.apart
 
 _FAULTS: dict[str, list[Patch]] = {
-    "causal-off-by-one": [(context, "CAUSAL", (*model.CAUSAL[:-1], (-1, 3)))],
-    "causal-reversed": [(context, "CAUSAL", model.CAUSAL[::-1])],
+    "causal-off-by-one": [(context, "CAUSAL", (*registered_model.CAUSAL[:-1], (-1, 3)))],
+    "causal-reversed": [(context, "CAUSAL", registered_model.CAUSAL[::-1])],
     "context-floored": [(context, "scaled", _floored)],
     "features-truncated": [(context, "_squashed", _truncated)],
     "chroma-first": [(LevelCoder, "_wave", _chroma_first)],
@@ -169,7 +169,7 @@ _FAULTS: dict[str, list[Patch]] = {
         np.clip(np.arange(-2, n + 2), 0, n - 1))],
     "ignores-shifts": [(LevelCoder, "__init__", _without_shifts)],
     "ignores-grey-levels": [(LevelCoder, "__init__", _all_colour)],
-    "one-level-set": [(model, "LEVEL_SETS", 1)],
+    "one-level-set": [(registered_model, "LEVEL_SETS", 1)],
     "ignores-step": [(synthesis, "STEP_ORIGIN", 0)],
     "codes-certain-latents": [(laplace, "CERTAIN", -1)],
     "escapes-unsigned": [(planes._Decoder, "_escape", _unsigned)],

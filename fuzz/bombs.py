@@ -22,7 +22,7 @@ import msgpack
 import numpy as np
 import zstandard
 
-from proxyimg_codec import from_bytes, validate
+from proxyimg_codec import from_bytes
 from proxyimg_codec.container import file, undo
 from proxyimg_codec.container.chunks import Chunk, write
 from proxyimg_codec.container.file import Container
@@ -32,6 +32,7 @@ from proxyimg_codec.geometry import deltas
 from proxyimg_codec.geometry.mesh import BORDER, NEW, RANKED, Base, Mesh, _Border
 from proxyimg_codec.texture import planes
 from proxyimg_codec.texture.pyramid import PyramidTexture
+from proxyimg_codec.validation import validate
 
 Values = dict[str, Any]
 BOMBS: dict[str, Callable[[], bytes]] = {}

@@ -16,11 +16,12 @@ import numpy as np
 from fuzz import run
 
 with run.imports(__name__):
-    from proxyimg_codec import from_bytes, validate
-    from proxyimg_codec.doubts import ERROR
+    from proxyimg_codec import from_bytes
     from proxyimg_codec.errors import FormatError, LimitError, PxiError, UnsupportedError
     from proxyimg_codec.image import Image
     from proxyimg_codec.limits import Limits
+    from proxyimg_codec.validation import validate
+    from proxyimg_codec.validation.warnings import ERROR
 
 LIMITS = Limits(
     chunks=256, side=1 << 16, layers=16, networks=4, segments=512, gates=512, faces=1024,

@@ -62,7 +62,7 @@ def main(target: str, one_input: Callable[[bytes], None], first: list[bytes], fi
 
 def numpy_only() -> AbstractContextManager[Any]:
     """Without the compiled kernel."""
-    from proxyimg_codec import kernel
+    from proxyimg_codec.native import kernel
 
     def none() -> None:
         return None

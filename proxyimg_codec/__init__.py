@@ -27,8 +27,8 @@ from .limits import Limits
 
 if TYPE_CHECKING:
     from .encoder.encode import encode as encode
-    from .encoder.masks import Region as Region
     from .encoder.settings import Settings as Settings
+    from .encoder.shapes.masks import Region as Region
     from .image import Image as Image
     from .image import Layer as Layer
     from .image import from_bytes as from_bytes

@@ -13,19 +13,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import salvage
+from .codec import salvage
 from .container import file as container
 from .container.check import check
 from .container.chunks import Chunk, write
 from .container.undo import Step
 from .editable import Editable
 from .errors import LimitError, PxiError, UsageError
-from .files import read_bytes, write_atomically
 from .geometry import warp
 from .geometry.boundary import Boundary
 from .geometry.mesh import Mesh
 from .geometry.pose import REST, Pose
 from .geometry.track import Timeline, Track
+from .io.files import read_bytes, write_atomically
 from .limits import DEFAULT_LIMITS, SMALL_FILE, Limits
 from .render.cache import Cache
 from .render.compose import render
@@ -365,7 +365,7 @@ class Image:
         Raises:
             LimitError: It is larger than readers accept by default.
         """
-        from .packing import pack, padding
+        from .codec.pack import pack, padding
 
         content, budget = pack(self), DEFAULT_LIMITS.budget()
         check(content, budget)
@@ -378,7 +378,7 @@ class Image:
     @cached_property
     def chunks(self) -> tuple[Chunk, ...]:
         """The chunks of its file but uNDO and TAIL."""
-        from .packing import pack
+        from .codec.pack import pack
 
         return tuple(container.present(pack(self)))
 
@@ -422,7 +422,7 @@ def from_bytes(data: bytes, limits: Limits = DEFAULT_LIMITS, *, tolerant: bool =
         UnsupportedError: It needs a newer reader.
         LimitError: It exceeds `limits`.
     """
-    from .packing import unpack
+    from .codec.pack import unpack
 
     damage: tuple[str, ...] = ()
     try:

@@ -10,9 +10,9 @@ from unittest import mock
 import numpy as np
 from numpy.typing import NDArray
 
-from proxyimg_codec import kernel
 from proxyimg_codec.entropy import laplace
-from proxyimg_codec.texture import model, planes
+from proxyimg_codec.native import kernel
+from proxyimg_codec.texture import planes, registered_model
 from proxyimg_codec.texture.planes import Latents
 
 from .dump import grid
@@ -46,30 +46,30 @@ def models() -> Iterator[str]:
     """Rows of the table of registered models."""
     yield "| Number | File | Bytes | H | C |"
     yield "|---|---|---|---|---|"
-    for number in model.REGISTERED:
+    for number in registered_model.REGISTERED:
         data = _file(number)
-        hidden, context = struct.unpack_from("<HH", data, len(model.MAGIC))
+        hidden, context = struct.unpack_from("<HH", data, len(registered_model.MAGIC))
         yield f"| {number} | `pyramid-{number}.bin` | {len(data)} | {hidden} | {context} |"
 
 
 def registered() -> Iterator[str]:
     """Lines of Python with the SHA-256 of each model."""
     yield "REGISTERED = {"
-    for number, digest in model.REGISTERED.items():
+    for number, digest in registered_model.REGISTERED.items():
         yield f'    {number}: "{digest}",'
     yield "}"
 
 
 def layout() -> Iterator[str]:
     """Rows of the table of arrays in a model file, with the exponents of the newest model."""
-    number = max(model.REGISTERED)
-    found = model.registered(number)
+    number = max(registered_model.REGISTERED)
+    found = registered_model.registered(number)
     h, c = 10007, 10009  # stand for any widths
     letters = {h: "H", c: "C"}
-    head = ", ".join(str(k) for k in range(1, model.LEVEL_SETS))
+    head = ", ".join(str(k) for k in range(1, registered_model.LEVEL_SETS))
     yield f"| Array | Type | Shape | e in model {number}: levels {head}, and above |"
     yield "|---|---|---|---|"
-    for name, shape, kind in model.layout(h, c):
+    for name, shape, kind in registered_model.layout(h, c):
         part, level, array = ["", "0", name] if " " not in name else name.split()
         if level != "0":
             continue

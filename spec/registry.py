@@ -7,7 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from proxyimg_codec import errors, levels
+from proxyimg_codec import errors
+from proxyimg_codec.codec import levels
 from proxyimg_codec.container import (
     chunks,
     head,
@@ -23,9 +24,9 @@ from proxyimg_codec.container import (
     undo,
 )
 from proxyimg_codec.container.fields import Field
-from proxyimg_codec.doubts import CODES
 from proxyimg_codec.limits import DEFAULT_LIMITS
-from proxyimg_codec.texture import model
+from proxyimg_codec.texture import registered_model
+from proxyimg_codec.validation.warnings import CODES
 
 CHUNKS = {
     head.TYPE: "canvas",
@@ -65,7 +66,7 @@ CODERS = {texr.SHARED: "shared", texr.IMPLICIT: "implicit", texr.PYRAMID: "pyram
 
 def _numbers() -> dict[str, dict[int, str]]:
     """Fields whose numbers may grow, with their meanings."""
-    models = {number: f"pyramid-{number}.bin" for number in model.REGISTERED}
+    models = {number: f"pyramid-{number}.bin" for number in registered_model.REGISTERED}
     return {"coder of TEXR": CODERS, "sampling of LAYR": SAMPLINGS, "model of PLAN": models}
 
 
@@ -124,7 +125,7 @@ def as_json(fields: Mapping[str, Sequence[Field]], ids: Sequence[str]) -> str:
         "numbers": {
             field: {str(k): v for k, v in known.items()} for field, known in _numbers().items()
         },
-        "models": {str(k): digest for k, digest in model.REGISTERED.items()},
+        "models": {str(k): digest for k, digest in registered_model.REGISTERED.items()},
         "limits": asdict(DEFAULT_LIMITS),
         "profiles": list(levels.PROFILES),
         "levels": [{n: getattr(v, n) for n in levels.COUNTED} for v in levels.LEVELS],

@@ -63,7 +63,7 @@ def small_pxi(tmp_path_factory, small_masks) -> Path:
     """A file of 64x48 pixels with the layers back, bar and disc."""
     pytest.importorskip("cv2")
     from proxyimg_codec.encoder.encode import encode
-    from proxyimg_codec.encoder.masks import Region
+    from proxyimg_codec.encoder.shapes.masks import Region
 
     picture = smooth(64, 48)
     picture[small_masks["bar"]] //= 2

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from conformance.builders import Numbers
 from conformance.moving import moving, track
-from proxyimg_codec.edit.geometry import meshed
+from proxyimg_codec.edit.transforms import meshed
 from proxyimg_codec.geometry.track import Timeline
 from proxyimg_codec.image import Image, Layers
 from tests import pyramids

@@ -30,9 +30,11 @@ from conformance.cases import FOLDER, LEVELS, PROFILES, Case, Render, flags, loa
 from conformance.judge import Ended
 from conformance.processes import command_decoder, expand
 from conformance.untested import UNTESTED
-from proxyimg_codec import from_bytes, kernel, pictures
+from proxyimg_codec import from_bytes
 from proxyimg_codec.cli import decode
 from proxyimg_codec.container.chunks import read
+from proxyimg_codec.io import raster
+from proxyimg_codec.native import kernel
 
 CASES = load()
 BY_NAME = {case.name: case for case in CASES}
@@ -468,7 +470,7 @@ def test_what_is_optional_may_be_refused_or_shown():
     assert {case.error for case in optional} == {"invalid", "limit"}
     case = BY_NAME["invalid-tree-circle"]
     right = case.renders[0].expected.read_bytes()
-    wrong = pictures.encode_png(pixels.read(right) ^ 0x4000)
+    wrong = raster.encode_png(pixels.read(right) ^ 0x4000)
     ends = [
         (ending(4), ""),
         (ending(0, right), ""),
@@ -599,7 +601,7 @@ def picture(*pixel, dtype=np.uint16, shape=(3, 5)):
 def test_png_with_every_filter_is_read(channels):
     rng = np.random.default_rng(0)
     wanted = rng.integers(0, 65536, (7, 6, channels), np.uint16)
-    assert (pixels.read(pictures.encode_png(wanted)) == wanted).all()
+    assert (pixels.read(raster.encode_png(wanted)) == wanted).all()
     raw = wanted.astype(">u2").view(np.uint8).reshape(7, -1)
     step, above = 2 * channels, np.zeros(raw.shape[1], int)
     for kind in range(5):
@@ -635,14 +637,14 @@ def test_npy_of_other_shapes_is_refused(shape):
 
 
 def test_damaged_png_is_refused():
-    data = pictures.encode_png(picture(1, 2, 3))
+    data = raster.encode_png(picture(1, 2, 3))
     for i in range(len(data)):
         with pytest.raises(ValueError, match="PNG"):
             pixels.read(data[:i])
         with pytest.raises(ValueError, match=r"PNG|shape"):
             pixels.read(data[:i] + bytes([data[i] ^ 1]) + data[i + 1 :])
     with pytest.raises(ValueError, match="16-bit"):
-        pixels.read(pictures.encode_png(picture(1, 2, 3, dtype=np.uint8)))
+        pixels.read(raster.encode_png(picture(1, 2, 3, dtype=np.uint8)))
 
 
 def test_differences_are_premultiplied_8_bit_levels():
@@ -681,7 +683,7 @@ def test_one_bad_number_is_enough(bad, tmp_path):
         np.save(target, almost)
         return Ended(0)
 
-    (tmp_path / "black.png").write_bytes(pictures.encode_png(picture(0, 0, 0)))
+    (tmp_path / "black.png").write_bytes(raster.encode_png(picture(0, 0, 0)))
     case = Case("c", "", (), Path(), (Render({}, (), tmp_path / "black.png", 1e9, 1e9),), None)
     result = judge.judge(case, 0, decoder, ".npy")
     assert result.problem == "pixels: not all are finite numbers"

@@ -10,7 +10,7 @@ import pytest
 from proxyimg_codec import from_bytes
 from proxyimg_codec.container.chunks import READABLE, read, write
 from proxyimg_codec.errors import FormatError, PxiError
-from proxyimg_codec.validate import validate
+from proxyimg_codec.validation.validate import validate
 
 ROOT = Path(__file__).parents[1]
 FILES = {

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from proxyimg_codec import pictures
+from proxyimg_codec.io import raster
 from tests.conftest import disc, smooth
 
 ROOT = Path(__file__).parents[1]
@@ -33,22 +33,20 @@ def commands(page):
 def folder(tmp_path_factory):
     pytest.importorskip("cv2")
     path = tmp_path_factory.mktemp("docs")
-    pictures.write(path / "photo.png", smooth(96, 64))
+    raster.write(path / "photo.png", smooth(96, 64))
     (path / "masks").mkdir()
     mask = disc(96, 64)
     low = np.zeros_like(mask)
     low[50:] = True
     for name, m in (("1 bush", low), ("2 cat", mask)):
-        pictures.write(
-            path / "masks" / f"{name}.png", np.repeat(m[..., None] * np.uint8(255), 3, 2)
-        )
+        raster.write(path / "masks" / f"{name}.png", np.repeat(m[..., None] * np.uint8(255), 3, 2))
     labels = np.where(mask, 2, low.astype(int)).astype(np.uint8)
-    pictures.write(path / "labels.png", np.repeat(labels[..., None], 3, 2))
+    raster.write(path / "labels.png", np.repeat(labels[..., None], 3, 2))
     clear = np.dstack([smooth(96, 64), disc(96, 64) * np.uint8(255)])
-    pictures.write(path / "character.png", np.ascontiguousarray(clear.transpose(1, 0, 2)))
-    pictures.write(path / "bear.png", clear)
-    pictures.write(path / "parrots.png", smooth(96, 64))
-    pictures.write(path / "parrots-labels.png", np.repeat(labels[..., None], 3, 2))
+    raster.write(path / "character.png", np.ascontiguousarray(clear.transpose(1, 0, 2)))
+    raster.write(path / "bear.png", clear)
+    raster.write(path / "parrots.png", smooth(96, 64))
+    raster.write(path / "parrots-labels.png", np.repeat(labels[..., None], 3, 2))
     (path / "breathe.json").write_text(blocks("docs/guide.md", "json")[0])
     edits = [{"op": "move", "layer": "cat", "by": [3, 4]}]
     (path / "edits.json").write_text(json.dumps({"version": 1, "edits": edits}))

@@ -6,9 +6,9 @@ import stat
 
 import pytest
 
-from proxyimg_codec import files
 from proxyimg_codec.errors import InputError
-from proxyimg_codec.files import read_bytes, write_atomically
+from proxyimg_codec.io import files
+from proxyimg_codec.io.files import read_bytes, write_atomically
 
 
 def full(*args, **kwargs):

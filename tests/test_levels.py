@@ -9,9 +9,9 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from conformance.cases import load
+from proxyimg_codec.codec.levels import COUNTED, LEVELS, PROFILES, profile_and_level
 from proxyimg_codec.container.chunks import Chunk, read, write
 from proxyimg_codec.errors import LimitError
-from proxyimg_codec.levels import COUNTED, LEVELS, PROFILES, profile_and_level
 from proxyimg_codec.limits import DEFAULT_LIMITS
 
 FILES = {case.name: case.input.read_bytes() for case in load() if case.renders}
@@ -55,7 +55,7 @@ def test_one_count_above_a_level_makes_the_next(more):
 def test_the_faces_of_meshes_count(monkeypatch):
     assert profile_and_level(FILES["closing-1"]) == ("posed", 1)
     few = replace(LEVELS[0], faces=8)
-    monkeypatch.setattr("proxyimg_codec.levels.LEVELS", (few, *LEVELS[1:]))
+    monkeypatch.setattr("proxyimg_codec.codec.levels.LEVELS", (few, *LEVELS[1:]))
     assert profile_and_level(FILES["closing-1"]) == ("posed", 2)
 
 

@@ -18,7 +18,7 @@ from proxyimg_codec.geometry.coverage import coverage
 from proxyimg_codec.geometry.warp import barycentric
 from proxyimg_codec.image import Layers
 from proxyimg_codec.limits import DEFAULT_LIMITS, SMALL_FILE, Limits
-from proxyimg_codec.validate import validate
+from proxyimg_codec.validation.validate import validate
 from tests import moving
 
 ROOT = Path(__file__).parents[1]

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from proxyimg_codec import from_bytes
-from proxyimg_codec.doubts import ERROR
 from proxyimg_codec.errors import FormatError, LimitError, UnsupportedError
-from proxyimg_codec.validate import validate
+from proxyimg_codec.validation.validate import validate
+from proxyimg_codec.validation.warnings import ERROR
 
 FILES = sorted((Path(__file__).parent / "malformed").glob("*.pxi"))
 CLASSES = {"format": FormatError, "unsupported": UnsupportedError, "limit": LimitError}

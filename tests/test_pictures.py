@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from proxyimg_codec.errors import InputError, UnsupportedError, UsageError
-from proxyimg_codec.metadata import is_cut_jpeg, raw_blocks, upright
-from proxyimg_codec.pictures import encode_png, read, write
+from proxyimg_codec.io.metadata import is_cut_jpeg, raw_blocks, upright
+from proxyimg_codec.io.raster import encode_png, read, write
 
 oiio = pytest.importorskip("OpenImageIO")
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import proxyimg_codec as pxi
-from proxyimg_codec import pictures
-from proxyimg_codec.quality import psnr
+from proxyimg_codec.io import raster
+from proxyimg_codec.io.psnr import psnr
 
 PSNR, BYTES = 29.4, 6600
 PHOTO = Path(__file__).parents[1] / "docs" / "images" / "photo.png"
@@ -16,7 +16,7 @@ PHOTO = Path(__file__).parents[1] / "docs" / "images" / "photo.png"
 
 @pytest.fixture(scope="module")
 def crop():
-    return np.ascontiguousarray(pictures.read(PHOTO).pixels[100:228, 380:572, :3])
+    return np.ascontiguousarray(raster.read(PHOTO).pixels[100:228, 380:572, :3])
 
 
 @pytest.fixture(scope="module")

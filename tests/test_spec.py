@@ -22,7 +22,7 @@ from proxyimg_codec.geometry.mesh import Base, Mesh
 from proxyimg_codec.geometry.pose import REST, Pose
 from proxyimg_codec.image import Image, Layer, Layers, from_bytes
 from proxyimg_codec.limits import Limits
-from proxyimg_codec.texture import context, diffusion, model, planes, pyramid
+from proxyimg_codec.texture import context, diffusion, planes, pyramid, registered_model
 from proxyimg_codec.texture.implicit import ImplicitTexture
 from proxyimg_codec.texture.network import NetShape, Network
 from tests.geometry.test_mesh import lattice
@@ -129,7 +129,7 @@ def table(chapter):
         ("5-geometry.md", (boundary, coverage), 5),
         ("7-implicit.md", (diffusion,), 2),
         ("6-mesh-and-pose.md", (mesh, pose, warp), 17),
-        ("8-pyramid.md", (model, context, laplace, planes, pyramid), 10),
+        ("8-pyramid.md", (registered_model, context, laplace, planes, pyramid), 10),
     ],
 )
 def test_constants_are_those_of_the_code(chapter, modules, count):
@@ -475,8 +475,8 @@ def test_sums_of_the_context_are_exact_in_single_precision():
     """As chapter 8 says of all registered models: whatever the inputs, below 2**24."""
     inputs = {"first": 127, "second": 255, "causal": 127, "mix": 255, "luma": 255,
               "from_luma": 127, "chroma": 255}  # fmt: skip
-    for number in model.REGISTERED:
-        for level in model.registered(number).context:
+    for number in registered_model.REGISTERED:
+        for level in registered_model.registered(number).context:
             step = np.abs(level.first_by_step.values) * 347 >> 8
             for name, most in inputs.items():
                 weights = np.abs(getattr(level, name).values)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from conformance.cases import load
-from proxyimg_codec import doubts, from_bytes, validate
+from proxyimg_codec import from_bytes
 from proxyimg_codec.container import fields, layr, mesh, meta, texr, undo
 from proxyimg_codec.container.chunks import Chunk, read, write
 from proxyimg_codec.container.undo import Step
@@ -15,6 +15,7 @@ from proxyimg_codec.errors import FormatError, LimitError, PxiError, Unsupported
 from proxyimg_codec.geometry import deltas
 from proxyimg_codec.image import Layers
 from proxyimg_codec.limits import Limits
+from proxyimg_codec.validation import validate, warnings
 from tests import moving, pyramids
 
 ROOT = Path(__file__).parents[1]
@@ -28,13 +29,13 @@ def check(data, **limits):
 
 
 def errors(data, **limits):
-    return [v for v in check(data, **limits) if v.severity == doubts.ERROR]
+    return [v for v in check(data, **limits) if v.severity == warnings.ERROR]
 
 
 def odd(image):
     """Codes of a picture that is valid."""
     issues = check(image.to_bytes())
-    assert not any(v.severity == doubts.ERROR for v in issues), issues
+    assert not any(v.severity == warnings.ERROR for v in issues), issues
     return [v.code for v in issues]
 
 

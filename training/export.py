@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from proxyimg_codec.encoder.pyramid.model import Model, weight_step
-from proxyimg_codec.texture.model import CAUSAL, LEVEL_SETS, Array, pack
+from proxyimg_codec.texture.registered_model import CAUSAL, LEVEL_SETS, Array, pack
 
 
 def fixed(values: Tensor | None, exponent: int) -> Array:

@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from ..edit.geometry import meshed
+from ..edit.transforms import meshed
 from ..errors import UsageError
 from ..geometry.mesh import FRACTION_BITS
 from ..image import Image, Layer, Layers
 from . import motion as motions
 from .bake import bake
 from .body import Body
+from .coupling import ridden, touching, united
 from .motion import LayerMotion, Motion
 from .presets import Box
 from .simulate import simulate
-from .together import ridden, touching, united
 
 EDGE = 0.035
 """Edges of meshes that are made for motion, relative to the diagonal of a layer."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UsageError
-from .parts import Disc, Rectangle, Spot
+from .motion_types import Disc, Rectangle, Spot
 
 Real = NDArray[np.float64]
 Index = NDArray[np.int64]

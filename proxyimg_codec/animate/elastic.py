@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .body import Body
-from .parts import LayerMotion
+from .motion_types import LayerMotion
 
 Real = NDArray[np.float64]
 Index = NDArray[np.int64]

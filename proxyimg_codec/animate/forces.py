@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from . import parts
+from . import motion_types
 
 Real = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ class Wind:
     """
 
     def __init__(
-        self, wind: parts.Wind, nodes: Real, response: Real, seed: int, period: float | None
+        self, wind: motion_types.Wind, nodes: Real, response: Real, seed: int, period: float | None
     ) -> None:
         random = np.random.default_rng([seed, TREMOR])
         octave = np.repeat(np.arange(OCTAVES), WAVES)
@@ -87,7 +87,7 @@ class Curve:
         period: After how many seconds it repeats, or None.
     """
 
-    def __init__(self, handle: parts.Handle, period: float | None) -> None:
+    def __init__(self, handle: motion_types.Handle, period: float | None) -> None:
         self.times = [k.time for k in handle.keys]
         self.values = np.array([(*k.offset, k.scale) for k in handle.keys])
         self.smooth = handle.ease == "smooth"

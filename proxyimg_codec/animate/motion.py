@@ -16,7 +16,7 @@ from typing import Any
 from ..errors import InputError, UsageError
 from . import presets
 from .materials import MATERIALS, Material
-from .parts import (
+from .motion_types import (
     Attachment,
     Collide,
     Disc,

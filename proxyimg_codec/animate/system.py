@@ -13,7 +13,7 @@ from . import collide, elastic, forces
 from .body import Body
 from .constraints import Areas, Attachments, Constraint, Distances, Shape
 from .motion import Motion
-from .parts import LayerMotion
+from .motion_types import LayerMotion
 
 Real = NDArray[np.float64]
 Index = NDArray[np.int64]

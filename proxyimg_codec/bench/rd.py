@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import pictures
 from ..errors import InputError, LimitError, PxiError, UsageError
+from ..io import raster
 from .peers import Codec
 from .rows import Row
 
@@ -116,7 +116,7 @@ def _source(path: Path, masks: Path | None) -> Source:
 
 def load(path: Path) -> Pixels:
     """uint8 [H, W, 3] RGB, or [H, W, 4] where something is transparent; grey becomes RGB."""
-    pixels = pictures.read(path).pixels
+    pixels = raster.read(path).pixels
     if pixels.dtype.kind == "f":
         pixels = np.rint(np.clip(pixels, 0, 1) * 255).astype(np.uint8)
     elif pixels.dtype != np.uint8:
@@ -200,7 +200,7 @@ def _measure(source: Source, codec: Codec, task: Task) -> Row:
     pixels = _pixels(source.path)
     encode = codec.encode
     if codec.masks:
-        from ..encoder.masks import load_masks
+        from ..encoder.shapes.masks import load_masks
 
         encode = partial(encode, masks=load_masks(str(source.masks), source.width, source.height))
     _warm(codec)

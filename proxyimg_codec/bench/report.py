@@ -10,7 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from .. import __version__
-from ..files import write_atomically
+from ..io.files import write_atomically
 from . import summary
 from .peers import Codec
 from .plots import draw

@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 from ..errors import InputError
-from ..files import read_bytes
+from ..io.files import read_bytes
 
 
 @dataclass(frozen=True)

@@ -180,7 +180,7 @@ def spot(text: str) -> Any:
 def write_picture(image: Image, args: argparse.Namespace) -> str:
     """Writes the picture with its motion; says what that is."""
     from ..animate.animate import amplitude
-    from ..files import write_atomically
+    from ..io.files import write_atomically
 
     data = image.to_bytes()
     write_atomically(args.output, data)

@@ -159,7 +159,7 @@ def export(image: Any, args: argparse.Namespace) -> None:
     Raises:
         UsageError: There is no such model of it.
     """
-    from ..files import write_atomically
+    from ..io.files import write_atomically
 
     if args.graph == "full":
         from ..export import onnx_renderer
@@ -206,7 +206,7 @@ def render(image: Any, output: str, args: argparse.Namespace) -> None:
     """Renders and writes the picture."""
     import numpy as np
 
-    from ..pictures import write
+    from ..io.raster import write
     from ..render.view import make_view
 
     region = parse_region(args.region)
@@ -238,7 +238,7 @@ def render(image: Any, output: str, args: argparse.Namespace) -> None:
 
 def layered(image: Any, output: str, kind: str, args: argparse.Namespace) -> None:
     """Writes the layers as OpenRaster, or their outlines as SVG."""
-    from ..files import write_atomically
+    from ..io.files import write_atomically
 
     layers = [key(n) for n in args.layer] if args.layer else None
     wanted = {"layers": layers, "background": not args.no_background, "engine": args.engine}

@@ -106,8 +106,8 @@ def edit_file(args: argparse.Namespace) -> None:
     operations = [_parsed(*edit) for edit in args.edits]
 
     from ..edit.script import apply
-    from ..files import write_atomically
     from ..image import open_image
+    from ..io.files import write_atomically
 
     started = time.perf_counter()
     image, number = open_image(args.input, limits_of(args)), 1
@@ -153,7 +153,7 @@ def _parsed(flag: str, parse: Callable[..., Values], words: list[str]) -> Values
 
 def listing(image: Any) -> dict[str, Any]:
     """Layers, groups and history, ready for JSON."""
-    from ..edit.geometry import bounds
+    from ..edit.transforms import bounds
 
     layers = []
     for i, layer in enumerate(image.layers):
@@ -318,7 +318,7 @@ def _outlines(file: str) -> Values:
 
 def _script(file: str) -> Values:
     from ..edit.script import parse
-    from ..files import read_bytes
+    from ..io.files import read_bytes
 
     try:
         words = read_bytes(file).decode()

@@ -89,9 +89,9 @@ def encode_file(args: argparse.Namespace) -> None:
     check_target(output, args.force, args.input)
     settings = settings_from(args)
 
-    from ..files import read_bytes, write_atomically
     from ..image import from_bytes
-    from ..quality import psnr
+    from ..io.files import read_bytes, write_atomically
+    from ..io.psnr import psnr
 
     started, cpu = time.perf_counter(), time.process_time()
     source = read_bytes(args.input)
@@ -127,9 +127,9 @@ def encoded(source: bytes, args: argparse.Namespace, settings: Any, bar: Bar) ->
     """The image of a picture file in memory, and the pixels that it should show."""
     from ..encoder.encode import encode
     from ..encoder.import_layers import composite, encode_layers
-    from ..encoder.masks import load_masks
     from ..encoder.openraster import is_openraster, read_openraster
-    from ..pictures import parse
+    from ..encoder.shapes.masks import load_masks
+    from ..io.raster import parse
 
     seen = 0
 

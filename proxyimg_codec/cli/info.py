@@ -11,7 +11,7 @@ from typing import Any
 from ..container import texr
 from ..container.chunks import VERSION
 from ..container.file import Container, parse
-from ..files import read_bytes
+from ..io.files import read_bytes
 from .common import add_limits, limits_of, parser, printable, run
 
 CODERS = {texr.IMPLICIT: "implicit", texr.PYRAMID: "pyramid"}

@@ -13,11 +13,11 @@ from collections import Counter
 from dataclasses import asdict
 from typing import Any
 
-from .. import validate
-from ..doubts import CODES, ERROR, WARNING, Issue
 from ..errors import FormatError, InputError, LimitError, PxiError, UnsupportedError
-from ..files import read_bytes
+from ..io.files import read_bytes
 from ..limits import Limits
+from ..validation import validate
+from ..validation.warnings import CODES, ERROR, WARNING, Issue
 from .common import add_limits, limits_of, parser, printable, run
 
 RESULTS: dict[str, type[PxiError] | None] = {

@@ -7,11 +7,11 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from .. import markup
 from ..errors import InputError, UnsupportedError
 from ..export.svg import INKSCAPE, identifiers
 from ..geometry.boundary import COORDINATE_MAX, Boundary
 from ..image import Image, Layer
+from ..io import xml
 from ..limits import DEFAULT_LIMITS, Limits
 from .svg_shapes import Points, curves_of, page_of, shapes, tag_of
 
@@ -48,7 +48,7 @@ def load(
         UnsupportedError: The file has clones, nested documents or even-odd filled holes.
         LimitError: Too large.
     """
-    root = markup.parse(data, name)
+    root = xml.parse(data, name)
     if tag_of(root) != "svg":
         raise InputError(f"{name}: not an SVG file, its root element is {root.tag[:80]!r}")
     drawn = [e.get(key, "") for e in root.iter() for key in ("d", "points")]
@@ -85,7 +85,7 @@ def _layer_of(element: Element, image: Image, name: str) -> Layer:
     """The layer that a shape's label, id or title names."""
     names = [layer.name for layer in image.layers]
     by_id = dict(zip(identifiers(names), image.layers, strict=True))
-    by_name = {markup.text(layer.name): layer for layer in image.layers}
+    by_name = {xml.text(layer.name): layer for layer in image.layers}
     title = next((child.text or "" for child in element if tag_of(child) == "title"), "")
     label, id_ = element.get(f"{{{INKSCAPE}}}label", ""), element.get("id", "")
     for layer in (by_name.get(label), by_id.get(id_), by_name.get(id_), by_name.get(title)):

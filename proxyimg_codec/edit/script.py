@@ -11,10 +11,10 @@ from typing import Any
 
 from ..errors import PxiError, UsageError
 from ..image import Image
-from . import geometry, look, structure
+from . import appearance, structure, transforms
 from .operations import KINDS, OPERATIONS, run
 
-__all__ = ["OPERATIONS", "apply", "geometry", "look", "parse", "schema", "structure"]
+__all__ = ["OPERATIONS", "appearance", "apply", "parse", "schema", "structure", "transforms"]
 
 
 def apply(image: Image, operations: Iterable[Mapping[str, Any]], first: int = 1) -> Image:

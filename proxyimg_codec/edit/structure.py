@@ -7,7 +7,6 @@ from dataclasses import replace
 
 from ..errors import UsageError
 from ..image import Image, Layer
-from .geometry import TARGET
 from .operations import (
     changed,
     checked_name,
@@ -18,6 +17,7 @@ from .operations import (
     shown_together,
     substituted,
 )
+from .transforms import TARGET
 
 ONE = "layer: a layer's name or position"
 

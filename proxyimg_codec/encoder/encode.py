@@ -18,13 +18,13 @@ from ..image import Image, Layer, Layers
 from ..limits import DEFAULT_LIMITS
 from ..texture.implicit import ImplicitTexture
 from ..texture.network import Floats, NetShape, Network
-from . import fit, node
-from .hidden import extended
-from .layers import Plan, plan_layers
-from .masks import Region
-from .meshes import with_meshes
-from .problem import Problem, build
+from .completion.occluded import extended
+from .implicit import fit, node_problem
+from .implicit.fit_problem import Problem, build
 from .settings import Settings
+from .shapes.layers import Plan, plan_layers
+from .shapes.masks import Region
+from .shapes.meshes import with_meshes
 
 CODES_MAX = DEFAULT_LIMITS.codes
 """Codes that readers accept: where a large picture would have more, they lie further apart."""
@@ -134,7 +134,7 @@ def fit_image(
     if (problem.target == problem.target[0]).all():
         problem = problem_of(NetShape(1, 0, 1, 1, plan.channels), np.inf)
     elif settings.sampling == "node":
-        problem = node.build(problem, plan.layers, size, node.options_for(settings))
+        problem = node_problem.build(problem, plan.layers, size, node_problem.options_for(settings))
     state, stored = _fit(problem, settings, report)
     network, textures = assemble(problem, state, stored, settings)
     info = {
@@ -204,8 +204,8 @@ def _fit(
         done += count
         report("texture", done, settings.steps)
 
-    if isinstance(problem, node.NodeProblem):
-        from .fit_node import fit_quantized
+    if isinstance(problem, node_problem.NodeProblem):
+        from .implicit.fit_node import fit_quantized
 
         state = fit_quantized(
             problem, settings.steps, settings.bits, settings.weight_bits, settings.seed,
@@ -218,7 +218,7 @@ def _fit(
         )  # fmt: skip
     stored = problem.stored()
     if settings.background == "complete":
-        from .background import complete
+        from .completion.background import complete
 
         stored[0] = complete(problem, state, stored[0], settings)
     return state, stored

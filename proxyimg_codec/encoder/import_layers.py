@@ -20,12 +20,12 @@ from ..limits import DEFAULT_LIMITS
 from ..texture.implicit import ImplicitTexture
 from ..texture.network import Floats, NetShape, Network
 from .encode import Progress, check_blocks, fit_image, to_float
-from .layers import LayerPlan, Plan, plan_layers
-from .masks import unique_names
-from .meshes import with_meshes
+from .implicit.fit_problem import Problem, build_apart
 from .openraster import LayeredPicture, SourceLayer
-from .problem import Problem, build_apart
 from .settings import Settings
+from .shapes.layers import LayerPlan, Plan, plan_layers
+from .shapes.masks import unique_names
+from .shapes.meshes import with_meshes
 
 MARGIN = 8
 """Pixels around a layer's own that its outline is fitted with."""

@@ -18,11 +18,11 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import markup
 from ..errors import InputError, LimitError, UnsupportedError
+from ..io import xml
+from ..io.raster import parse as parse_picture
 from ..limits import DEFAULT_LIMITS, Limits
-from ..pictures import parse as parse_picture
-from .masks import unique_names
+from .shapes.masks import unique_names
 
 NAME_MAX = 200
 """Characters of a layer's name before a number that makes it unique."""
@@ -90,7 +90,7 @@ def read_openraster(data: bytes, name: str, limits: Limits = DEFAULT_LIMITS) -> 
         archive = zipfile.ZipFile(io.BytesIO(data))
     except (zipfile.BadZipFile, NotImplementedError, ValueError, struct.error) as error:
         raise InputError(f"{name}: not an OpenRaster file ({error})") from None
-    root = markup.parse(_entry(archive, "stack.xml", name, markup.BYTES_MAX), f"{name}: stack.xml")
+    root = xml.parse(_entry(archive, "stack.xml", name, xml.BYTES_MAX), f"{name}: stack.xml")
     if root.tag != "image" or root.find("stack") is None:
         raise InputError(f"{name}: stack.xml holds no stack of layers")
     width, height = (_integer(root, key, f"{name}: the canvas") for key in ("w", "h"))

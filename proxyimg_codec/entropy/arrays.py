@@ -14,8 +14,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import kernel
 from ..errors import FormatError
+from ..native import kernel
 from .rans import FEW, SCALE_BITS, Decoder, Encoder
 
 MODEL_BITS = 4

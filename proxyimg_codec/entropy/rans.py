@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import kernel
 from ..errors import FormatError
+from ..native import kernel
 
 SCALE_BITS = 14
 """Frequencies of a distribution sum to `1 << SCALE_BITS`."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..geometry.mesh import FRACTION_BITS
 from ..geometry.pose import COLOUR_BITS, OPACITY_MAX, Pose
 from ..image import Layer
-from ..texture import diffusion, node
+from ..texture import diffusion, node_sampling
 from ..texture.implicit import ImplicitTexture
 from ..texture.pyramid import TAPS, PyramidTexture
 from .onnx_graph import Graph, Value
@@ -96,19 +96,19 @@ def _at_nodes(layer: Layer, texture: ImplicitTexture, shown: Shown) -> Value:
     graph, parts = shown.points.graph, []
     image = layer.image
     assert image is not None, "a layer of no image has no canvas"
-    if layer.sampling != node.GLOBAL:
+    if layer.sampling != node_sampling.GLOBAL:
         assert layer.mesh is not None, "local features need a mesh"
         assert shown.face is not None
         assert shown.weights is not None
         refined = layer.mesh.refined
-        features = node._at(texture, layer.box, refined.nodes / (1 << FRACTION_BITS))
+        features = node_sampling._at(texture, layer.box, refined.nodes / (1 << FRACTION_BITS))
         corners = graph.constant(features[refined.faces]).take(shown.face)  # [N, 3, D]
         parts.append((corners * shown.weights.reshape(0, -1, 1)).reduced("Sum", 1))
-    if layer.sampling != node.LOCAL:
-        anchors = node.anchors(layer.boundary, (image.width, image.height))
-        features = node._at(texture, layer.box, anchors)
+    if layer.sampling != node_sampling.LOCAL:
+        anchors = node_sampling.anchors(layer.boundary, (image.width, image.height))
+        features = node_sampling._at(texture, layer.box, anchors)
         away = [shown.points.take(np.array([k]), 1) - anchors[:, k] for k in (0, 1)]  # [N, S]
-        shares = 1 / (away[0] * away[0] + away[1] * away[1]).maximum(node.NEAR)
+        shares = 1 / (away[0] * away[0] + away[1] * away[1]).maximum(node_sampling.NEAR)
         total = shares.reduced("Sum", 1).reshape(-1, 1)
         parts.append(graph.op("MatMul", shares, features) / total)
     return graph.concat(parts, 1).astype(np.float32)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..texture import model
+from ..texture import registered_model
 from ..texture.network import Floats
 from ..texture.planes import Latents, Planes
 from ..texture.synthesis import BANDS, mirrored_indices, wavelet
@@ -47,7 +47,7 @@ def build(planes: Planes) -> onnx.ModelProto:
         UnsupportedError: onnx is not installed, or the model of the planes is not known.
     """
     graph = Graph()
-    weights = model.registered(planes.packed["model"])
+    weights = registered_model.registered(planes.packed["model"])
     levels, step, (columns, rows) = planes.packed["levels"], planes.packed["step"], planes.size
     h, w = (-(-n >> levels) for n in (rows, columns))
     low = graph.input("lowest", np.float32, (1, 3, h, w))
@@ -62,11 +62,11 @@ def build(planes: Planes) -> onnx.ModelProto:
 
 
 def _finer(
-    net: model.Synthesis, step: int, low: Value, latents: Value, shape: tuple[int, int]
+    net: registered_model.Synthesis, step: int, low: Value, latents: Value, shape: tuple[int, int]
 ) -> Value:
     """The next finer planes [1, 3, 2h, 2w]; as in `texture.synthesis`."""
     graph = low.graph
-    t = np.float32((step - model.STEP_ORIGIN) / 128)
+    t = np.float32((step - registered_model.STEP_ORIGIN) / 128)
     gain = np.exp(net.gain.floats + net.gain_by_step.floats * t).reshape(1, 9, 1, 1)
     high = latents * gain
     ring = np.array([0, 0, 1, 1, 0, 0, 1, 1])
@@ -96,7 +96,7 @@ def _extended(low: Value, high: Value, shape: tuple[int, int]) -> Value:
     return low.graph.concat(wide, 1)
 
 
-def _coloured(weights: model.Model, planes: Planes, low: Value) -> Value:
+def _coloured(weights: registered_model.Model, planes: Planes, low: Value) -> Value:
     """`samples` of the finest planes [1, 3, h, w]."""
     graph, (columns, rows) = low.graph, planes.size
     to_colour = weights.to_colour.floats * np.float32(2 ** (planes.packed["step"] / 64) / 255)

@@ -16,11 +16,11 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import markup
 from ..image import Image
+from ..io import xml
+from ..io.raster import encode_png
 from ..limits import DEFAULT_LIMITS, Limits
-from ..pictures import encode_png
-from .shown import at_full_opacity, chosen_layers, opacity_text, region_of
+from .common import at_full_opacity, chosen_layers, opacity_text, region_of
 
 THUMBNAIL_SIDE = 256
 
@@ -69,7 +69,7 @@ def build(
         source = f"data/layer{k}.png"
         parts[source] = encode_png(pixels, icc)
         attributes = {
-            "name": markup.text(layer.name),
+            "name": xml.text(layer.name),
             "src": source,
             "x": str(region[0] + x),
             "y": str(region[1] + y),
@@ -80,7 +80,7 @@ def build(
         ElementTree.SubElement(stack, "layer", attributes)
         if progress:
             progress(1)
-    parts["stack.xml"] = markup.serialize(root)
+    parts["stack.xml"] = xml.serialize(root)
     shown = [layer.name for layer in chosen if not layer.pose.hidden]
     width, height = image.width, image.height
     flat = partial(_flat, image, shown, engine=engine, limits=limits)

@@ -9,11 +9,11 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import markup
 from ..geometry.boundary import Boundary
 from ..geometry.pose import OPACITY_MAX
 from ..image import Image, Layer
-from .shown import at_full_opacity, chosen_layers, opacity_text, region_of
+from ..io import xml
+from .common import at_full_opacity, chosen_layers, opacity_text, region_of
 
 NAMESPACE = "http://www.w3.org/2000/svg"
 INKSCAPE = "http://www.inkscape.org/namespaces/inkscape"
@@ -60,7 +60,7 @@ def build(
         outline = layer.outline
         shape = ElementTree.SubElement(root, "rect" if outline is None else "path")
         shape.set("id", ids[layer])
-        shape.set("inkscape:label", markup.text(layer.name))
+        shape.set("inkscape:label", xml.text(layer.name))
         shape.set("fill", _mean_colour(full, layer, engine))
         if layer.pose.opacity < OPACITY_MAX:
             shape.set("opacity", opacity_text(layer))
@@ -71,7 +71,7 @@ def build(
         else:
             shape.set("fill-rule", "nonzero")
             shape.set("d", path_data(outline))
-    return markup.serialize(root)
+    return xml.serialize(root)
 
 
 def identifiers(names: Sequence[str]) -> list[str]:

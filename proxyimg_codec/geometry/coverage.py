@@ -13,8 +13,8 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import kernel
 from ..limits import DEFAULT_LIMITS, Limits
+from ..native import kernel
 
 Ints = NDArray[np.int64]
 

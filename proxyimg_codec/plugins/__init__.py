@@ -19,11 +19,11 @@ from typing import Any
 from ..errors import UsageError
 
 BUILT_IN = {
-    "segmenters": {"regions": "proxyimg_codec.encoder.segment:segment"},
+    "segmenters": {"regions": "proxyimg_codec.encoder.shapes.segment:segment"},
     "meshers": {
         "delaunay": "proxyimg_codec.geometry.mesher:delaunay",
-        "triwild": "proxyimg_codec.encoder.wild:triwild",
-        "ftetwild": "proxyimg_codec.encoder.wild:ftetwild",
+        "triwild": "proxyimg_codec.encoder.shapes.external_meshers:triwild",
+        "ftetwild": "proxyimg_codec.encoder.shapes.external_meshers:ftetwild",
     },
 }
 """Parts of this package: kind, name, and where the object is."""

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import kernel
 from ..geometry import coverage as cover
 from ..geometry.boundary import Boundary
 from ..geometry.mesh import FRACTION_BITS
 from ..geometry.pose import COLOUR_BITS, OPACITY_MAX
 from ..geometry.warp import Located, Warp
 from ..limits import DEFAULT_LIMITS, SAMPLE_COST_BITS, Limits
-from ..texture import node
+from ..native import kernel
+from ..texture import node_sampling
 from ..texture.implicit import ImplicitTexture
 from ..texture.network import Floats
 from ..texture.pyramid import PyramidTexture
@@ -177,7 +177,7 @@ class _Painter:
             )
         network = self._image.networks[texture.network]
         cost = network.shape.parameters
-        if layer.sampling in (node.BOTH, node.GLOBAL):
+        if layer.sampling in (node_sampling.BOTH, node_sampling.GLOBAL):
             anchors = 4 if layer.boundary is None else sum(layer.boundary.segments)
             cost += anchors * len(texture.steps) << ANCHOR_COST_BITS
         self._limits.spend("multiply_adds", len(at) * cost)
@@ -212,9 +212,9 @@ def _at_nodes(image: Image, layer: Layer, texture: ImplicitTexture, shown: Locat
     nodes = np.zeros((1, 2)) if refined is None else refined.nodes / (1 << FRACTION_BITS)
     faces = np.zeros((1, 3), np.int32) if refined is None else refined.faces
     count = len(shown.x)
-    features = node.features(
+    features = node_sampling.features(
         texture, layer.box, layer.sampling, nodes, faces,
-        node.anchors(layer.boundary, size),
+        node_sampling.anchors(layer.boundary, size),
         np.zeros(count, np.int64) if shown.face is None else shown.face,
         np.zeros((count, 3)) if shown.weights is None else shown.weights,
         np.stack([shown.x, shown.y], axis=1),

@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from .. import kernel
 from ..errors import UnsupportedError, UsageError
+from ..native import kernel
 from ..texture.implicit import ImplicitTexture, Taps
 from ..texture.network import Floats, Network
 

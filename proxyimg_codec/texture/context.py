@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from ..entropy import laplace
 from .convolution import by_row, convolved, strips
-from .model import CAUSAL, STEP_ORIGIN, Array, Context
 from .network import Floats
+from .registered_model import CAUSAL, STEP_ORIGIN, Array, Context
 
 Ints = NDArray[np.int32]
 

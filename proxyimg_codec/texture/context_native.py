@@ -1,4 +1,4 @@
-"""Levels of a pyramid in the compiled kernel (`_kernel_pyramid.h`); `context` is its judge."""
+"""Levels of a pyramid in the compiled kernel (`native/pyramid.h`); `context` is its judge."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import kernel
 from ..entropy import laplace, rans
 from ..errors import FormatError
+from ..native import kernel
 from . import context
 from .context import Ints, LevelCoder
 

@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import kernel
 from ..entropy import arrays, laplace, rans
 from ..errors import FormatError
-from . import context, context_native, model, synthesis
+from ..native import kernel
+from . import context, context_native, registered_model, synthesis
 from .context import Ints
 from .network import Floats
 
@@ -92,7 +92,7 @@ class Planes:
             UnsupportedError: The model is not known.
         """
         found = self.latents
-        weights = model.registered(self.packed["model"])
+        weights = registered_model.registered(self.packed["model"])
         out = synthesis.samples(weights, found.levels, found.lowest, self.packed["step"])
         columns, rows = self.size
         out = np.ascontiguousarray(out[:rows, :columns])
@@ -109,7 +109,7 @@ def unpack(fields: Mapping[str, Any], where: str = "chunk PLAN") -> Planes:
         FormatError: The fields contradict each other.
         UnsupportedError: The model is not known.
     """
-    model.registered(fields["model"])
+    registered_model.registered(fields["model"])
     levels, components = fields["levels"], fields["components"]
     if components == 2:
         raise FormatError("2 components: they are 1 or 3", where, rule="PYR-2")
@@ -390,7 +390,7 @@ def _steps(
     values: Latents | None,
 ) -> Iterator[Ints]:  # fmt: skip
     """Codes and gives the lowest planes, then each level, coarsest first."""
-    weights = model.registered(fields["model"])
+    weights = registered_model.registered(fields["model"])
     levels, step, size = fields["levels"], fields["step"], fields["size"]
     columns, rows = (-(-n >> levels) for n in size)
     lowest = _code_lowest(coder, fields, (rows, columns), values)
@@ -400,9 +400,11 @@ def _steps(
     for level in range(levels, 0, -1):
         shifts = fields["shifts"][2 * level - 2 : 2 * level]
         here = context.LevelCoder(
-            weights.context[min(level, model.LEVEL_SETS) - 1], step, level <= fields["grey"],
+            weights.context[min(level, registered_model.LEVEL_SETS) - 1],
+            step,
+            level <= fields["grey"],
             (shifts[0] - SHIFT_ORIGIN, shifts[1] - SHIFT_ORIGIN),
-        )  # fmt: skip
+        )
         support = support_at(cells, fields["cell"], size, level, levels)
         given = None if values is None else values.levels[level - 1]
         if kernel.available():

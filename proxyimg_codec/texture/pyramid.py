@@ -15,10 +15,10 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import kernel
 from ..container import texr
 from ..entropy import arrays
 from ..errors import FormatError
+from ..native import kernel
 from .cuts import NOTHING, Apart, Cuts, Samples
 from .diffusion import FRACTION_BITS, diffused
 from .implicit import Box, ImplicitTexture

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import kernel
+from ..native import kernel
 from . import synthesis_native
 from .context import Ints
 from .convolution import by_row, convolved, strips
-from .model import STEP_ORIGIN, Model, Synthesis
 from .network import Floats
+from .registered_model import STEP_ORIGIN, Model, Synthesis
 
 # Antonini et al. 1992, table II, orthonormal: half of the synthesis filters of the CDF 9/7 wavelet.
 _LOW = (0.788485616406, 0.418092273222, -0.040689417609, -0.064538882629)

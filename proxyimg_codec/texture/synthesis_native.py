@@ -1,4 +1,4 @@
-"""Synthesis of a level in the compiled kernel (`_kernel_synthesis.h`); `synthesis` is its judge."""
+"""Synthesis of a level in the compiled kernel (`native/synthesis.h`); `synthesis` is its judge."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import ctypes as ct
 
 import numpy as np
 
-from .. import kernel
+from ..native import kernel
 from .context import Ints
-from .model import Synthesis
 from .network import Floats
+from .registered_model import Synthesis
 
 ARRAYS = (
     "linear", "first", "first_bias", "second", "second_bias", "third", "third_bias", "gain",

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from proxyimg_codec.animate.forces import Curve, Wind, falloff
-from proxyimg_codec.animate.parts import Handle, Key
-from proxyimg_codec.animate.parts import Wind as Blow
+from proxyimg_codec.animate.motion_types import Handle, Key
+from proxyimg_codec.animate.motion_types import Wind as Blow
 
 GRID = np.stack(np.meshgrid(np.linspace(0, 400, 30), np.linspace(0, 300, 20))).reshape(2, -1)
 

@@ -7,7 +7,7 @@ import pytest
 
 from proxyimg_codec import from_bytes
 from proxyimg_codec.animate.animate import animate, preset
-from proxyimg_codec.animate.together import touching
+from proxyimg_codec.animate.coupling import touching
 from proxyimg_codec.geometry.pose import REST
 from proxyimg_codec.geometry.warp import barycentric
 from tests.pyramids import cut_picture

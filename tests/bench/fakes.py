@@ -5,9 +5,9 @@ import zlib
 
 import numpy as np
 
-from proxyimg_codec import pictures
 from proxyimg_codec.bench.peers import Codec
 from proxyimg_codec.errors import UnsupportedError
+from proxyimg_codec.io import raster
 
 
 def encode(pixels, quality):
@@ -69,5 +69,5 @@ def picture(seed, width=48, height=40, channels=3):
 def folder_of(path, **named):
     path.mkdir()
     for name, pixels in named.items():
-        pictures.write(path / f"{name}.png", pixels)
+        raster.write(path / f"{name}.png", pixels)
     return path

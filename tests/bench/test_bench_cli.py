@@ -13,10 +13,10 @@ pytest.importorskip("cv2")
 pytest.importorskip("matplotlib")
 pytest.importorskip("imagecodecs")
 
-from proxyimg_codec import pictures
 from proxyimg_codec.bench import peers, rd, rows, summary
 from proxyimg_codec.bench.measure import bd_rate, psnr
 from proxyimg_codec.bench.rows import Row, read_csv
+from proxyimg_codec.io import raster
 
 from . import fakes
 from .fakes import fake, folder_of, picture
@@ -129,7 +129,7 @@ def test_masks_reach_the_codec(two, tmp_path):
     masks.mkdir()
     labels = np.zeros((40, 48, 3), np.uint8)
     labels[10:30, 10:30] = 1
-    pictures.write(masks / "b.png", labels)
+    raster.write(masks / "b.png", labels)
     tasks = rd.plan(rd.find(two, None, masks), [FAKES["plain"], FAKES["layers"]])
     done = [rd.measure(t) for t in tasks]
     assert [(r.picture, r.codec) for r in done] == (
@@ -179,8 +179,8 @@ def test_reuse(tool, two, tmp_path, fake_codecs, monkeypatch):
     out, again = tmp_path / "out", tmp_path / "again"
     tool("bench", "rd", two, "--codecs", "plain", "--out", out)
     before = read_csv(out / "rd.csv")
-    pictures.write(two / "c.png", picture(1))
-    pictures.write(two / "b.png", picture(5))
+    raster.write(two / "c.png", picture(1))
+    raster.write(two / "b.png", picture(5))
     fake_codecs.clear()
     text = tool("bench", "rd", two, "--codecs", "plain,opaque", "--qualities", "opaque=3,4",
                 "--reuse", out / "rd.csv", "--out", again).out.decode()  # fmt: skip
@@ -302,7 +302,7 @@ def test_bad_command_lines(tool, two, tmp_path, fake_codecs, monkeypatch, words,
         (tmp_path / name).mkdir()
     (tmp_path / "broken" / "a.png").write_bytes(b"\x89PNG nothing")
     for suffix in (".png", ".ppm"):
-        pictures.write(tmp_path / "twins" / f"a{suffix}", picture(1))
+        raster.write(tmp_path / "twins" / f"a{suffix}", picture(1))
     assert message in tool("bench", "rd", *words, code=code).err
     assert not fake_codecs
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from proxyimg_codec.edit.geometry import meshed
+from proxyimg_codec.edit.transforms import meshed
 from proxyimg_codec.geometry.mesh import FRACTION_BITS
 from proxyimg_codec.geometry.track import Timeline, Track
 from proxyimg_codec.image import Layers

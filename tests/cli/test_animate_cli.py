@@ -9,7 +9,7 @@ import pytest
 
 import proxyimg_codec as pxi
 from proxyimg_codec.animate.sequence import frames, times
-from proxyimg_codec.pictures import read
+from proxyimg_codec.io.raster import read
 
 pytest.importorskip("OpenImageIO")
 

@@ -8,7 +8,7 @@ import pytest
 
 import proxyimg_codec as pxi
 from proxyimg_codec.encoder.encode import encode
-from proxyimg_codec.pictures import read
+from proxyimg_codec.io.raster import read
 from proxyimg_codec.render import engines
 
 pytest.importorskip("OpenImageIO")

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import proxyimg_codec as pxi
-from proxyimg_codec import pictures
+from proxyimg_codec.io import raster
 
 
 @pytest.fixture
@@ -208,5 +208,5 @@ def test_outlines_come_back_from_svg(tool, work):
 def test_decoding_shows_the_edit(tool, work):
     edited(tool, work, "--remove", "disc")
     tool("decode", work / "out.pxi", work / "out.png")
-    pixels = pictures.read(work / "out.png").pixels
+    pixels = raster.read(work / "out.png").pixels
     assert pixels[24, 32, 0] < 180  # the disc is red

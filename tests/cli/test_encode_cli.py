@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import proxyimg_codec as pxi
-from proxyimg_codec.pictures import encode_png, encode_ppm, write
-from proxyimg_codec.quality import psnr_8bit
+from proxyimg_codec.io.psnr import psnr_8bit
+from proxyimg_codec.io.raster import encode_png, encode_ppm, write
 
 pytest.importorskip("cv2")
 oiio = pytest.importorskip("OpenImageIO")
@@ -117,7 +117,7 @@ def test_number_of_layers(encode):
 
 def test_boundary_method(encode, monkeypatch, tmp_path, photo):
     pytest.importorskip("torch")
-    chamfer = pytest.importorskip("proxyimg_codec.encoder.chamfer")
+    chamfer = pytest.importorskip("proxyimg_codec.encoder.shapes.chamfer")
     slow = chamfer.fit_paths_chamfer
     monkeypatch.setattr(
         chamfer, "fit_paths_chamfer", lambda mask, step: slow(mask, step, iterations=10)
@@ -136,7 +136,7 @@ BACKGROUNDS = ("diffuse", "complete")
 
 
 def test_background_completion_stores_more_of_the_back(encode, tmp_path):
-    pytest.importorskip("proxyimg_codec.encoder.background")
+    pytest.importorskip("proxyimg_codec.encoder.completion.background")
     big = np.zeros((40, 48), bool)
     big[4:36, 4:44] = True
     masks = save_masks(tmp_path / "masks", object=big)

@@ -9,7 +9,7 @@ import pytest
 
 from proxyimg_codec.cli.validate import RESULTS
 from proxyimg_codec.container.chunks import Chunk, read, write
-from proxyimg_codec.doubts import CODES
+from proxyimg_codec.validation.warnings import CODES
 from tests import pyramids
 
 ROOT = Path(__file__).parents[2]

@@ -14,7 +14,7 @@ import proxyimg_codec as pxi
 from conformance.builders import Numbers, texture
 from conformance.moving import moving as with_tracks
 from conformance.moving import track as random_track
-from proxyimg_codec.edit.geometry import meshed
+from proxyimg_codec.edit.transforms import meshed
 from proxyimg_codec.errors import UsageError
 from proxyimg_codec.image import Layers
 from tests import moving

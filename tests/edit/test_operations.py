@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import proxyimg_codec as pxi
-from proxyimg_codec import pictures
 from proxyimg_codec.container.chunks import Chunk
 from proxyimg_codec.edit.operations import OPERATIONS
 from proxyimg_codec.errors import UsageError
 from proxyimg_codec.geometry import coverage as cover
+from proxyimg_codec.io import raster
 from proxyimg_codec.render.compose import outline
 from proxyimg_codec.render.view import make_view
 
@@ -170,7 +170,7 @@ def test_textures_of_files(image, small_pxi, tmp_path):
 
 def test_textures_of_pictures(image, tmp_path):
     path = tmp_path / "blue.png"
-    pictures.write(path, np.full((20, 20, 3), (10, 20, 200), np.uint8))
+    raster.write(path, np.full((20, 20, 3), (10, 20, 200), np.uint8))
     changed = image.layers["disc"].textured(str(path))
     assert np.abs(changed.render()[24, 32].astype(int) - (10, 20, 200)).max() <= 2
 

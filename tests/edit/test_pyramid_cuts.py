@@ -9,12 +9,12 @@ import pytest
 
 import proxyimg_codec as pxi
 from conformance.builders import ellipse
-from proxyimg_codec import pictures
 from proxyimg_codec.container.file import parse
 from proxyimg_codec.export import openraster
 from proxyimg_codec.geometry import coverage as cover
 from proxyimg_codec.geometry.boundary import Boundary
 from proxyimg_codec.image import Layers
+from proxyimg_codec.io import raster
 from proxyimg_codec.render.compose import outline
 from proxyimg_codec.render.view import make_view
 from proxyimg_codec.texture.cuts import GONE, NOTHING, Apart, Cuts
@@ -303,7 +303,7 @@ def test_textures_for_other_files(cut, made_up_planes, tmp_path, fit, name):
 def test_openraster_has_what_is_hidden(cut):
     pytest.importorskip("OpenImageIO")
     with zipfile.ZipFile(io.BytesIO(openraster.build(cut))) as archive:
-        back = pictures.parse(archive.read("data/layer0.png"), "back").pixels
+        back = raster.parse(archive.read("data/layer0.png"), "back").pixels
     np.testing.assert_array_equal(back, cut.render(layers=["back"]))
 
 

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from proxyimg_codec.encoder.chamfer import fit_paths_chamfer
-from proxyimg_codec.encoder.contours import fit_paths, trace
-from proxyimg_codec.encoder.paths import faults, flatten
+from proxyimg_codec.encoder.shapes.chamfer import fit_paths_chamfer
+from proxyimg_codec.encoder.shapes.contours import fit_paths, trace
+from proxyimg_codec.encoder.shapes.paths import faults, flatten
 
 MASKS = pathlib.Path(__file__).parents[3] / "shared" / "data" / "kodak_masks"
 Y, X = np.mgrid[:96, :128]

@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from proxyimg_codec import kernel
-from proxyimg_codec.encoder import fit
-from proxyimg_codec.encoder.fit_native import NativeTrainer
-from proxyimg_codec.encoder.fit_torch import TorchTrainer
-from proxyimg_codec.encoder.problem import build
+from proxyimg_codec.encoder.implicit import fit
+from proxyimg_codec.encoder.implicit.fit_native import NativeTrainer
+from proxyimg_codec.encoder.implicit.fit_problem import build
+from proxyimg_codec.encoder.implicit.fit_torch import TorchTrainer
 from proxyimg_codec.geometry.boundary import Boundary
+from proxyimg_codec.native import kernel
 from proxyimg_codec.texture.network import NetShape
 
 needs_kernel = pytest.mark.skipif(not kernel.available(), reason="the kernel was not compiled")

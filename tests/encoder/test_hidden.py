@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 import proxyimg_codec as pxi
-from proxyimg_codec.encoder.hidden import BAND, KNOWN, LATTICE, continued, extended
-from proxyimg_codec.encoder.masks import Region
-from proxyimg_codec.encoder.problem import build
+from proxyimg_codec.encoder.completion.occluded import BAND, KNOWN, LATTICE, continued, extended
+from proxyimg_codec.encoder.implicit.fit_problem import build
+from proxyimg_codec.encoder.shapes.masks import Region
 from proxyimg_codec.geometry.boundary import Boundary
 from proxyimg_codec.texture.network import NetShape
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import proxyimg_codec as pxi
-from proxyimg_codec import markup
 from proxyimg_codec.export import openraster as export
-from proxyimg_codec.export.shown import at_full_opacity
+from proxyimg_codec.export.common import at_full_opacity
+from proxyimg_codec.io import xml
+from proxyimg_codec.io.psnr import psnr, psnr_8bit
+from proxyimg_codec.io.raster import encode_png
 from proxyimg_codec.limits import Limits
-from proxyimg_codec.pictures import encode_png
-from proxyimg_codec.quality import psnr, psnr_8bit
 from tests.conftest import smooth
 from tests.test_pictures import icc
 
@@ -247,7 +247,7 @@ def test_limits():
     huge[16:24] = b"\x7f\xff\xff\xff" * 2
     refused(pxi.LimitError, ora(layer(), a=bytes(huge)), "side: 2147483647")
     refused(pxi.LimitError, ora(layer(), size=(1 << 40, 4), a=PNG), "side")
-    refused(pxi.LimitError, with_stack(b"<image>" + b" " * markup.BYTES_MAX), "stack.xml")
+    refused(pxi.LimitError, with_stack(b"<image>" + b" " * xml.BYTES_MAX), "stack.xml")
 
 
 # Compositing and encoding

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from proxyimg_codec.encoder.masks import (
+from proxyimg_codec.encoder.shapes.masks import (
     MAX_LABELS,
     Region,
     description,

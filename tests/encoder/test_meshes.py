@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 
 from proxyimg_codec.encoder.encode import to_float
-from proxyimg_codec.encoder.layers import plan_layers
-from proxyimg_codec.encoder.masks import Region
-from proxyimg_codec.encoder.meshes import gradient, refined, with_meshes
 from proxyimg_codec.encoder.settings import Settings
+from proxyimg_codec.encoder.shapes.layers import plan_layers
+from proxyimg_codec.encoder.shapes.masks import Region
+from proxyimg_codec.encoder.shapes.meshes import gradient, refined, with_meshes
 from proxyimg_codec.errors import UsageError
 from proxyimg_codec.geometry import coverage as cover
 from proxyimg_codec.geometry.mesh import Base, Mesh

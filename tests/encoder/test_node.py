@@ -9,19 +9,19 @@ import torch
 
 import proxyimg_codec as pxi
 from proxyimg_codec.cli.encode import arguments, settings_from
-from proxyimg_codec.encoder import fit, fit_node, node
 from proxyimg_codec.encoder.encode import assemble
-from proxyimg_codec.encoder.layers import LayerPlan, Plan
-from proxyimg_codec.encoder.masks import Region
-from proxyimg_codec.encoder.meshes import with_meshes
-from proxyimg_codec.encoder.node import NodeOptions
-from proxyimg_codec.encoder.problem import build
-from proxyimg_codec.encoder.rounding import Choice
+from proxyimg_codec.encoder.implicit import fit, fit_node, node_problem
+from proxyimg_codec.encoder.implicit.fit_problem import build
+from proxyimg_codec.encoder.implicit.node_problem import NodeOptions
+from proxyimg_codec.encoder.implicit.rounding import Choice
 from proxyimg_codec.encoder.settings import Settings
+from proxyimg_codec.encoder.shapes.layers import LayerPlan, Plan
+from proxyimg_codec.encoder.shapes.masks import Region
+from proxyimg_codec.encoder.shapes.meshes import with_meshes
 from proxyimg_codec.errors import UsageError
 from proxyimg_codec.geometry.mesh import FRACTION_BITS
-from proxyimg_codec.quality import psnr
-from proxyimg_codec.texture import node as decoder
+from proxyimg_codec.io.psnr import psnr
+from proxyimg_codec.texture import node_sampling as decoder
 from proxyimg_codec.texture.network import NetShape
 from tests.conftest import disc, smooth
 from tests.encoder.test_fit import square
@@ -37,7 +37,7 @@ def case(options=None, front=True, size=(WIDTH, HEIGHT)):
     plan = Plan(tuple(LayerPlan(str(k), b) for k, b in enumerate(outlines)), 3, True)
     layers = with_meshes(picture, plan, Settings(sampling="node")).layers
     problem = build(picture, outlines, NetShape(1, 0, 1, 1, 3), np.inf)
-    return node.build(problem, layers, size, options or NodeOptions()), layers
+    return node_problem.build(problem, layers, size, options or NodeOptions()), layers
 
 
 def test_parameters_are_those_of_the_paper():
@@ -45,7 +45,7 @@ def test_parameters_are_those_of_the_paper():
     shape = NodeOptions().network(3)
     assert shape.layers == [(672, 64), (64, 64), (64, 64), (64, 64), (64, 3)]
     assert shape.parameters == 55747
-    assert shape.parameters + 263 * node.DIM == 59955
+    assert shape.parameters + 263 * node_problem.DIM == 59955
 
 
 def test_a_code_a_cell_and_few_for_what_lies_behind():
@@ -53,10 +53,12 @@ def test_a_code_a_cell_and_few_for_what_lies_behind():
     assert [(v.columns, v.rows) for v in p.planes] == [(8, 8), (4, 3)]
     alone, _ = case(front=False)
     assert [(v.columns, v.rows) for v in alone.planes] == [(6, 5)]
-    dense = node.options_for(Settings(quality=100, sampling="node"))
+    dense = node_problem.options_for(Settings(quality=100, sampling="node"))
     assert dense.cell == pytest.approx(8 * (2.75 / 14) ** 0.5)
     assert dense.back_grid == 18
-    assert node.options_for(Settings(sampling="node")) == NodeOptions(cell=pytest.approx(8.0))
+    assert node_problem.options_for(Settings(sampling="node")) == NodeOptions(
+        cell=pytest.approx(8.0)
+    )
 
 
 @pytest.mark.parametrize(
@@ -123,12 +125,12 @@ def test_single_uses_the_triangles_of_the_base():
 
 def test_own_codes_are_those_of_the_nodes():
     p, _ = case(NodeOptions(edge=False, own_codes=True), front=False)
-    codes = torch.zeros((p.codes, node.DIM))
+    codes = torch.zeros((p.codes, node_problem.DIM))
     first = p.codes - p.own
     codes[first + 3] = 5.0
     got = fit_node.NodeTrainer(p, "cpu").features(codes, torch.arange(len(p.layer))).numpy()
     want = 5 * (p.weights * (p.corners == 3)).sum(1)
-    np.testing.assert_allclose(got, np.repeat(want[:, None], node.DIM, 1), atol=1e-5)
+    np.testing.assert_allclose(got, np.repeat(want[:, None], node_problem.DIM, 1), atol=1e-5)
     assert want.max() > 2
 
 

@@ -1,6 +1,6 @@
 import numpy as np
 
-from proxyimg_codec.encoder.problem import build
+from proxyimg_codec.encoder.implicit.fit_problem import build
 from proxyimg_codec.geometry.boundary import Boundary
 from proxyimg_codec.texture.network import NetShape
 

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from proxyimg_codec.encoder.segment import segment
+from proxyimg_codec.encoder.shapes.segment import segment
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
 

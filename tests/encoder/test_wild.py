@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from proxyimg_codec import plugins
-from proxyimg_codec.encoder import wild
+from proxyimg_codec.encoder.shapes import external_meshers
 from proxyimg_codec.errors import InputError, UnsupportedError, UsageError
 from proxyimg_codec.geometry.boundary import Boundary
 from proxyimg_codec.geometry.mesher import delaunay, fill, rim, sound
@@ -33,7 +33,7 @@ def pretend(monkeypatch):
     """pretend(code) is the mesh of a mesher with a worker that runs other code."""
 
     def call(code, name="triwild", boundary=RING, edge=0.1):
-        monkeypatch.setattr(wild, "worker", lambda: [sys.executable, "-c", code])
+        monkeypatch.setattr(external_meshers, "worker", lambda: [sys.executable, "-c", code])
         return plugins.find("meshers", name)(boundary, SIZE, edge)
 
     return call
@@ -80,7 +80,7 @@ def test_the_edge_length_acts_on_a_bare_rectangle(real):
 def test_triwild_fills_odd_shapes(shape):
     pytest.importorskip("wildmeshing")
     boundary = Boundary(2, tuple(SHAPES[shape]))
-    mesh = wild.triwild(boundary, (2000, 1300), 0.05)
+    mesh = external_meshers.triwild(boundary, (2000, 1300), 0.05)
     check(mesh)
     assert spare(mesh, boundary.paths) >= 1
 
@@ -117,7 +117,7 @@ def test_reasons_are_passed_on(pretend, name):
 
 
 def test_endless_processes_are_stopped(pretend, monkeypatch):
-    monkeypatch.setattr(wild, "SECONDS", 0.3)
+    monkeypatch.setattr(external_meshers, "SECONDS", 0.3)
     with pytest.raises(InputError, match=r"longer than 0.3 seconds"):
         pretend("import time; time.sleep(60)")
 
@@ -127,7 +127,7 @@ def test_missing_packages_are_named(pretend, name):
     code = f"""
 import sys
 sys.modules["{MESHERS[name]}"] = None
-from proxyimg_codec.encoder.wild import main
+from proxyimg_codec.encoder.shapes.external_meshers import main
 sys.exit(main("{name}"))
 """
     with pytest.raises(UnsupportedError, match=r"pip install 'proxyimg-codec\[meshers\]'"):

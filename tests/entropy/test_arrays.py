@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from proxyimg_codec import kernel
 from proxyimg_codec.entropy import arrays
 from proxyimg_codec.errors import FormatError
+from proxyimg_codec.native import kernel
 
 
 @st.composite

@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from proxyimg_codec import kernel
 from proxyimg_codec.entropy.rans import LOW, SCALE_BITS, Decoder, Encoder
 from proxyimg_codec.errors import FormatError
+from proxyimg_codec.native import kernel
 
 TOTAL = 1 << SCALE_BITS
 

@@ -12,7 +12,7 @@ import proxyimg_codec as pxi
 from proxyimg_codec.export import openraster
 from proxyimg_codec.geometry.boundary import Boundary
 from proxyimg_codec.image import Layers
-from proxyimg_codec.pictures import parse
+from proxyimg_codec.io.raster import parse
 from tests.conftest import smooth
 
 pytest.importorskip("OpenImageIO")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from proxyimg_codec.export import openraster, svg
-from proxyimg_codec.pictures import parse
+from proxyimg_codec.io.raster import parse
 from tests.pyramids import cut_picture, implicit, picture, planes
 
 

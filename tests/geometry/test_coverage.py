@@ -3,10 +3,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from proxyimg_codec import kernel
 from proxyimg_codec.errors import LimitError
 from proxyimg_codec.geometry.coverage import FULL, ONE, coverage, flatten, to_output
 from proxyimg_codec.limits import Limits
+from proxyimg_codec.native import kernel
 
 K = 0.5522847498
 

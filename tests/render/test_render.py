@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 
 import proxyimg_codec as pxi
-from proxyimg_codec import kernel
 from proxyimg_codec.errors import LimitError, UnsupportedError, UsageError
 from proxyimg_codec.geometry.boundary import Boundary
 from proxyimg_codec.image import Image, Layer, Layers
+from proxyimg_codec.native import kernel
 from proxyimg_codec.render import compose
 from proxyimg_codec.texture.implicit import ImplicitTexture
 from proxyimg_codec.texture.network import NetShape, Network

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from proxyimg_codec import kernel
 from proxyimg_codec.errors import FormatError
+from proxyimg_codec.native import kernel
 from proxyimg_codec.render import engines
 from proxyimg_codec.texture.implicit import ImplicitTexture, pack, taps, unpack
 from tests.texture.test_network import NetShape, random_network

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from proxyimg_codec.geometry.boundary import Boundary
-from proxyimg_codec.texture import node
+from proxyimg_codec.texture import node_sampling as node
 from tests.texture.test_implicit import texture
 
 BOX = (4, 2, 40, 25)

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from proxyimg_codec import kernel
 from proxyimg_codec.entropy import laplace
 from proxyimg_codec.errors import FormatError
-from proxyimg_codec.texture import context, model, planes, synthesis
+from proxyimg_codec.native import kernel
+from proxyimg_codec.texture import context, planes, registered_model, synthesis
 from proxyimg_codec.texture.planes import Latents, Planes
 
 needs_kernel = pytest.mark.skipif(not kernel.available(), reason="the kernel was not compiled")
@@ -260,7 +260,7 @@ def test_waves(size):
         when[rows, columns], last = turn, columns[0] + 3 * rows[0]
     assert ((when >= 0) == support).all()
     for y, x in np.argwhere(support):
-        for dy, dx in model.CAUSAL:
+        for dy, dx in registered_model.CAUSAL:
             if y + dy >= 0 and 0 <= x + dx < w and support[y + dy, x + dx]:
                 assert when[y + dy, x + dx] < when[y, x]
 
@@ -280,7 +280,7 @@ def test_rasters(size, components):
     assert got.dtype == np.float32
     assert got.flags.c_contiguous
     found = coded.latents
-    whole = synthesis.samples(model.registered(1), found.levels, found.lowest, 293)
+    whole = synthesis.samples(registered_model.registered(1), found.levels, found.lowest, 293)
     part = whole[: size[1], : size[0]]
     expected = part if components == 3 else part.mean(2, keepdims=True)
     np.testing.assert_allclose(got, np.clip(expected / 255, 0, 1), atol=1e-6)
@@ -296,7 +296,7 @@ def test_engines_synthesize_alike(case):
     for name in ("numpy", "kernel"):
         with engine(name):
             found[name] = synthesis.samples(
-                model.registered(1), latents.levels, latents.lowest, step
+                registered_model.registered(1), latents.levels, latents.lowest, step
             )
     scale = max(np.abs(found["numpy"]).max(), 255)
     np.testing.assert_allclose(found["kernel"], found["numpy"], atol=1e-5 * scale)

@@ -45,13 +45,13 @@ def test_a_resumed_run_is_an_unbroken_one(monkeypatch, folder, tmp_path, phase, 
 
 
 def test_export_is_what_the_decoder_reads(monkeypatch, folder, tmp_path):
-    from proxyimg_codec.texture import model
+    from proxyimg_codec.texture import registered_model
 
     run(monkeypatch, folder, tmp_path / "state.pt", 1, 2)
     monkeypatch.setattr(sys, "argv", ["export", str(tmp_path / "state.pt"), str(tmp_path)])
     export.main()
     data = (tmp_path / "pyramid-1.bin").read_bytes()
-    found = model.unpack(data)
+    found = registered_model.unpack(data)
     trained = torch.load(tmp_path / "state.pt")["model"]
     first = trained["levels.0.first.weight"].numpy()
     assert np.abs(found.context[0].first.floats - first).max() <= 2.0 ** (

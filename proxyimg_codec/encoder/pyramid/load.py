@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ...texture import model as registry
+from ...texture import registered_model as registry
 from .model import Model
 
 

@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 from ...errors import UsageError
 from ...geometry.boundary import Boundary
 from ...image import Image, Layer, Layers
-from ...quality import psnr
+from ...io.psnr import psnr
 from ...texture.cuts import Cuts
 from ...texture.network import Floats
 from ...texture.planes import Planes, cells_of
 from ...texture.pyramid import PyramidTexture
-from ..hidden import continued
-from ..layers import Plan
-from ..problem import coverage_of
+from ..completion.occluded import continued
+from ..implicit.fit_problem import coverage_of
 from ..settings import Settings
+from ..shapes.layers import Plan
 from .encode import CELL, EFFORTS, Effort, Raster, encode
 
 Report = Callable[[str, int, int], None]

@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from proxyimg_codec import from_bytes, pictures
+from proxyimg_codec import from_bytes
 from proxyimg_codec.container.file import parse
 from proxyimg_codec.encoder.encode import encode
-from proxyimg_codec.encoder.masks import Region, load_masks
 from proxyimg_codec.encoder.pyramid.picture import _view
+from proxyimg_codec.encoder.shapes.masks import Region, load_masks
 from proxyimg_codec.geometry.boundary import Boundary
+from proxyimg_codec.io import raster
 from tests.conftest import smooth
 from tests.edit.test_operations import grown
 
@@ -77,7 +78,7 @@ def test_nothing_red_is_left_of_a_red_parrot(data_dir):
     path = data_dir / "kodak_masks" / "kodim23.png"
     if not path.is_file():
         pytest.skip("the shared masks are not here")
-    picture = pictures.read(data_dir / "kodak" / "kodim23.png").pixels
+    picture = raster.read(data_dir / "kodak" / "kodim23.png").pixels
     head = np.s_[80:360, 360:720]
     whole = next(r.mask for r in load_masks(path, 768, 512) if r.name == "object 1")
     parrot = Region("parrot", whole[head])

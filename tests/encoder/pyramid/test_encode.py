@@ -15,8 +15,8 @@ from proxyimg_codec.encoder.pyramid.encode import Effort, Raster, Window
 from proxyimg_codec.encoder.pyramid.load import load
 from proxyimg_codec.encoder.settings import Settings
 from proxyimg_codec.errors import UsageError
-from proxyimg_codec.quality import psnr
-from proxyimg_codec.texture import model
+from proxyimg_codec.io.psnr import psnr
+from proxyimg_codec.texture import registered_model
 from proxyimg_codec.texture.pyramid import PyramidTexture
 
 FAST = {"texture": "pyramid", "effort": 1, "jobs": 1}
@@ -81,7 +81,7 @@ def test_soft_alpha_has_planes_of_its_own():
 
 
 def test_layers_share_planes_and_cost_little(small_masks):
-    from proxyimg_codec.encoder.masks import Region
+    from proxyimg_codec.encoder.shapes.masks import Region
 
     picture = textured(64, 48)
     picture[small_masks["disc"]] = (210, 60, 50)
@@ -95,7 +95,7 @@ def test_layers_share_planes_and_cost_little(small_masks):
 
 
 def test_removing_a_layer_shows_a_smooth_fill(small_masks):
-    from proxyimg_codec.encoder.masks import Region
+    from proxyimg_codec.encoder.shapes.masks import Region
 
     picture = textured(64, 48)
     picture[:] = (40, 120, 200)
@@ -253,8 +253,8 @@ def test_contradictions(wrong):
 
 
 def test_registered_weights_are_what_the_specification_says():
-    files = Path(model.__file__).parents[1] / "models"
-    for number, digest in model.REGISTERED.items():
+    files = Path(registered_model.__file__).parents[1] / "models"
+    for number, digest in registered_model.REGISTERED.items():
         data = (files / f"pyramid-{number}.bin").read_bytes()
         assert hashlib.sha256(data).hexdigest() == digest
         assert len(data) <= 250_000

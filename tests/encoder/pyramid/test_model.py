@@ -11,7 +11,7 @@ from proxyimg_codec.encoder.pyramid.load import load
 from proxyimg_codec.encoder.pyramid.model import LEVELS, Model, plain_synthesis
 from proxyimg_codec.encoder.pyramid.similarity import ms_ssim
 from proxyimg_codec.entropy import laplace
-from proxyimg_codec.texture import context, model, synthesis
+from proxyimg_codec.texture import context, registered_model, synthesis
 from proxyimg_codec.texture.planes import Latents, encoded
 
 STEP = 300
@@ -64,7 +64,7 @@ def test_synthesis_is_the_decoders(exact):
     with torch.no_grad():
         ours = exact.synthesise(found, step_of(STEP))[0].permute(1, 2, 0).numpy()
     own = whole(found)
-    theirs = synthesis.samples(model.registered(1), own.levels, own.lowest, STEP)
+    theirs = synthesis.samples(registered_model.registered(1), own.levels, own.lowest, STEP)
     assert np.abs(ours - theirs).max() < 0.01
 
 
@@ -113,7 +113,7 @@ def test_context_network_is_the_decoders_up_to_rounding(exact):
         plain = context.next_plain(plain, own.levels[level - 1])
     recorder = Recorder()
     support = np.ones(own.levels[k].shape[1:], bool)
-    coder = context.LevelCoder(model.registered(1).context[k], STEP, False, (0, 0))
+    coder = context.LevelCoder(registered_model.registered(1).context[k], STEP, False, (0, 0))
     coder.code(recorder, plain, own.levels[k + 1], support, own.levels[k])
     mean = np.concatenate([m.reshape(-1, 3) for m in recorder.means[::2]])
     scale = np.concatenate([m.reshape(-1, 3) for m in recorder.scales[::2]])
@@ -192,4 +192,4 @@ def test_levels_halve_the_step():
 
     assert float(log_step(step_of(293))) == pytest.approx(0, abs=1e-6)
     assert float(log_step(step_of(293 + 64))) == pytest.approx(0.5, abs=1e-6)
-    assert math.isclose((293 + 64 - model.STEP_ORIGIN) / 128, 0.5)
+    assert math.isclose((293 + 64 - registered_model.STEP_ORIGIN) / 128, 0.5)

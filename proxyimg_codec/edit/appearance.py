@@ -1,0 +1,278 @@
+"""Operations on how layers are shown: opacity, colour, texture (ProxyImg, equation 5)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError, PxiError, UsageError
+from ..geometry.boundary import Boundary
+from ..geometry.mesh import FRACTION_BITS
+from ..geometry.pose import COLOUR_BITS, COLOUR_MAX, NODE_BITS, NODE_MAX, OPACITY_MAX
+from ..geometry.warp import WEIGHT_BITS, barycentric
+from ..image import Image, Layer, open_image
+from ..texture.network import Network
+from ..texture.pyramid import PyramidTexture, Texture
+from .operations import changed, one, operation, shown_together, substituted
+from .transforms import TARGET, meshed, sampled
+
+LUMA = (0.2126, 0.7152, 0.0722)
+"""Weights of red, green and blue in luminance (ITU-R BT.709)."""
+
+Reals = NDArray[np.float64]
+
+
+@operation("opacity", layer=TARGET, value="number: 0 to 1")
+def opacity(image: Image, layer: str | int, value: float) -> Image:
+    """Sets the opacity of a layer."""
+    if not 0 <= value <= 1:
+        raise UsageError(f"opacity: {value} is not within 0 and 1")
+    return _posed(image, layer, opacity=round(value * OPACITY_MAX))
+
+
+@operation("hide", layer=TARGET)
+def hide(image: Image, layer: str | int) -> Image:
+    """Stops drawing a layer."""
+    return _posed(image, layer, hidden=True)
+
+
+@operation("show", layer=TARGET)
+def show(image: Image, layer: str | int) -> Image:
+    """Draws a hidden layer again."""
+    return _posed(image, layer, hidden=False)
+
+
+@operation("still", layer=TARGET)
+def still(image: Image, layer: str | int) -> Image:
+    """Forgets the motion of a layer."""
+    return substituted(image, [replace(v, track=None) for v in shown_together(image, layer)])
+
+
+def _posed(image: Image, target: str | int, **values: Any) -> Image:
+    layers = shown_together(image, target)
+    return substituted(image, [replace(v, pose=replace(v.pose, **values)) for v in layers])
+
+
+@operation("recolour", layer=TARGET, hue="number?: degrees to turn the hue by",
+           saturation="number?: a factor, 0 is grey", brightness="number?: a factor",
+           tint="colour?: #rrggbb, whose shades are used",
+           matrix="colours?: rows of a 3 x 4 matrix for red, green, blue and one")  # fmt: skip
+def recolour(
+    image: Image,
+    layer: str | int,
+    hue: float = 0,
+    saturation: float = 1,
+    brightness: float = 1,
+    tint: str | None = None,
+    matrix: Sequence[float] | None = None,
+) -> Image:
+    """Changes the colours of a layer, in the order of the parameters, on top of earlier changes."""
+    change = np.eye(4)
+    steps = [_hue(hue), _saturation(saturation), np.eye(3) * brightness]
+    if tint is not None:
+        target = np.array([int(tint[i : i + 2], 16) / 255 for i in (1, 3, 5)])
+        steps.append(np.outer(target / max(float(np.dot(target, LUMA)), 0.25), LUMA))
+    for step in steps:
+        change[:3] = step @ change[:3]
+    if matrix is not None:
+        change[:3] = np.array(matrix, float).reshape(3, 4) @ change
+    layers = []
+    for each in shown_together(image, layer):
+        before = np.eye(4)
+        if each.pose.colour:
+            before[:3] = np.array(each.pose.colour).reshape(3, 4) / (1 << COLOUR_BITS)
+        values = np.rint((change @ before)[:3] * (1 << COLOUR_BITS))
+        if np.abs(values).max() > COLOUR_MAX:
+            raise UsageError("recolour: the colours would change more than 256 times")
+        rest = np.array_equal(values, np.eye(4)[:3] * (1 << COLOUR_BITS))
+        colour = () if rest else tuple(int(v) for v in values.ravel())
+        layers.append(replace(each, pose=replace(each.pose, colour=colour)))
+    return substituted(image, layers)
+
+
+def _saturation(factor: float) -> Reals:
+    """Colour matrix of feColorMatrix `saturate` (W3C Filter Effects Module 1)."""
+    return factor * np.eye(3) + (1 - factor) * np.tile(LUMA, (3, 1))
+
+
+def _hue(degrees: float) -> Reals:
+    """Colour matrix of feColorMatrix `hueRotate` (W3C Filter Effects Module 1)."""
+    r, g, b = LUMA
+    grey = np.tile(LUMA, (3, 1))
+    skew = np.array([[-r, -g, 1 - b], [0.143, 0.140, -0.283], [-(1 - r), g, b]])
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    return np.asarray(grey + c * (np.eye(3) - grey) + s * skew)
+
+
+@operation("texture", layer="layer: the layer that changes, by name or position",
+           source="text: a layer of this picture, or the name of a .pxi or picture file",
+           from_layer="layer?: a layer of that .pxi file; its front one by default",
+           fit="fit?: box to box, or by the shape of the outlines")  # fmt: skip
+def texture(
+    image: Image,
+    layer: str | int,
+    source: str,
+    from_layer: str | int | None = None,
+    fit: str = "box",
+) -> Image:
+    """Gives a layer the texture of another layer, of another file's layer, or of a picture."""
+    target = one(image, layer)
+    networks = list(image.networks)
+    if source in {v.name for v in image.layers}:
+        if from_layer is not None:
+            raise UsageError("texture: from_layer needs a .pxi file as source")
+        origin = one(image, source)
+        shown = origin.texture
+    else:
+        origin = _loaded(source, from_layer)
+        shown = _brought(image, origin, networks)
+    if origin.sampling and fit == "shape":
+        raise UsageError(
+            f"texture: layer {origin.name!r} has its features at its own nodes, which do not fit "
+            "the outline of another layer; stretch it box to box"
+        )
+    if origin.sampling and target.mesh is None:
+        target = meshed(target)
+    new = replace(target, texture=shown, sampling=origin.sampling)
+    if fit == "shape" or origin.pose.places is not None:
+        new = _placed(new, origin, fit)
+    else:
+        new = replace(new, pose=replace(new.pose, places=None))
+    layers = [new if v.name == target.name else v for v in image.layers]
+    return changed(image, layers, networks=networks)
+
+
+def _brought(image: Image, origin: Layer, networks: list[Network]) -> Texture:
+    """The texture of another image's layer as one of `image`, whose `networks` may grow.
+
+    Planes come as a whole, with what other layers of their file show of them. A network or planes
+    that the image has already are taken from there.
+    """
+    texture = origin.texture
+    if isinstance(texture, PyramidTexture):
+        views = (v.texture for v in image.layers if isinstance(v.texture, PyramidTexture))
+        known = [p for view in views for p in view.sources]
+        own, *alpha = (
+            next((p for p in known if p.packed == source.packed), source)
+            for source in texture.sources
+        )
+        return replace(texture, planes=own, alpha=alpha[0] if alpha else None)
+    brought = origin.network
+    assert brought is not None
+    same = (i for i, v in enumerate(networks) if v.packed == brought.packed)
+    number = next(same, len(networks))
+    if number == len(networks):
+        networks.append(brought)
+    return replace(texture, network=number)
+
+
+def _loaded(source: str, name: str | int | None) -> Layer:
+    """The layer of a `.pxi` file, or a picture file as one layer.
+
+    Raises:
+        UsageError: There is no such file.
+        InputError: It cannot be read.
+    """
+    try:
+        with open(source, "rb") as file:
+            known = file.read(4) == b"\x89PXI"
+    except (FileNotFoundError, UnicodeError):
+        raise UsageError(
+            f"texture: {source!r} is neither a layer of the picture nor a file"
+        ) from None
+    except OSError as error:
+        raise InputError(f"{source}: cannot be read: {error.strerror}") from None
+    if known:
+        layers = open_image(source).layers
+        return layers[-1 if name is None else name]  # type: ignore[no-any-return]  # untyped key
+    if name is not None:
+        raise UsageError(f"texture: {source} is not a .pxi file, which from_layer needs")
+    from ..io.raster import read
+
+    pixels = read(source).pixels
+    try:
+        from ..encoder.encode import encode
+    except ModuleNotFoundError as error:
+        raise PxiError(
+            f"the texture of a picture needs {error.name}: pip install 'proxyimg-codec[encode]'"
+        ) from None
+    return encode(pixels, max_layers=1).layers[0]  # type: ignore[no-any-return]  # untyped key
+
+
+def _placed(layer: Layer, origin: Layer, fit: str) -> Layer:
+    """`layer`, whose texture is that of `origin`, with nodes that show what `origin` shows."""
+    layer = meshed(layer)
+    assert layer.mesh is not None
+    rest = layer.mesh.refined.nodes / (1 << FRACTION_BITS)
+    here, there = (np.array(v.box, float).reshape(2, 2) for v in (layer, origin))
+    scale = here[1] / there[1]
+    points = (
+        _matched(rest, layer, origin) if fit == "shape" else there[0] + (rest - here[0]) / scale
+    )
+    if origin.pose.places is not None:
+        assert origin.mesh is not None
+        refined = origin.mesh.refined
+        fixed = np.rint(points * (1 << FRACTION_BITS)).astype(np.int64)
+        face, weights = barycentric(fixed, refined.nodes, refined.faces)
+        corners = origin.pose.places[refined.faces[face]]
+        points += (weights[..., None] * corners).sum(1) / (1 << (WEIGHT_BITS + NODE_BITS))
+    # The box of a layer never changes: the plane is stretched over it.
+    shown = here[0] + (points - there[0]) * scale
+    places = np.rint((shown - rest) * (1 << NODE_BITS))
+    places = np.clip(places, 1 - NODE_MAX, NODE_MAX - 1).astype(np.int64)
+    return replace(layer, pose=replace(layer.pose, places=places if places.any() else None))
+
+
+def _matched(points: Reals, layer: Layer, origin: Layer) -> Reals:
+    """Points [N, 2] of a layer in the shape of another, so that outlines meet.
+
+    Polar: a point at direction t from the centre of its shape, at a share r of the way to the
+    outline, becomes the point at direction t and share r in the shape of `origin`.
+    """
+    assert layer.image is not None
+    assert origin.image is not None
+    here = _Star(layer.boundary, (layer.image.width, layer.image.height))
+    there = _Star(origin.boundary, (origin.image.width, origin.image.height))
+    away = points - here.centre
+    angle = np.arctan2(away[:, 1], away[:, 0])
+    ratio = there.reach(angle) / here.reach(angle)
+    return np.asarray(there.centre + away * ratio[:, None])
+
+
+class _Star:
+    """A shape seen from its centre: how far its outline is in every direction."""
+
+    DIRECTIONS = 360
+
+    def __init__(self, boundary: Boundary | None, size: tuple[int, int]) -> None:
+        if boundary is None:
+            w, h = size
+            corners = np.array([[0, 0], [w, 0], [w, h], [0, h]], float)
+            t = np.linspace(0, 1, 64, endpoint=False)[:, None]
+            points = np.concatenate(
+                [a + (b - a) * t for a, b in zip(corners, np.roll(corners, -1, 0), strict=True)]
+            )
+        else:
+            points = sampled(boundary)
+        self.centre = (points.min(0) + points.max(0)) / 2
+        away = points - self.centre
+        angle = np.arctan2(away[:, 1], away[:, 0])
+        length = np.hypot(*away.T)
+        slot = np.floor((angle / (2 * math.pi) % 1) * self.DIRECTIONS).astype(int)
+        far = np.zeros(self.DIRECTIONS)
+        np.maximum.at(far, slot % self.DIRECTIONS, length)
+        seen = np.flatnonzero(far > 0)
+        steps = np.arange(self.DIRECTIONS)
+        self._far = np.interp(steps, seen, far[seen], period=self.DIRECTIONS)
+
+    def reach(self, angle: Reals) -> Reals:
+        """Distance of the outline from the centre in directions [n], at least 1 px."""
+        place = (angle / (2 * math.pi) % 1) * self.DIRECTIONS - 0.5
+        steps = np.arange(self.DIRECTIONS)
+        found = np.interp(place % self.DIRECTIONS, steps, self._far, period=self.DIRECTIONS)
+        return np.asarray(np.maximum(found, 1.0), np.float64)

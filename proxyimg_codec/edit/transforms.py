@@ -1,0 +1,250 @@
+"""Operations on where layers are and how they are bent (ProxyImg, equation 4)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import UsageError
+from ..geometry import mesher
+from ..geometry.boundary import COORDINATE_MAX, Boundary
+from ..geometry.mesh import FRACTION_BITS, Mesh
+from ..geometry.pose import NODE_BITS, NODE_MAX, Matrix, Pose, fixed, inverse, product
+from ..image import Image, Layer
+from . import deform
+from .operations import members, one, operation, substituted
+
+EDGE_FRONT, EDGE_BACK = 0.05, 0.2
+"""Edge lengths of meshes relative to the diagonal of a layer (ProxyImg, l_r^f and l_r^b)."""
+
+REST_UNIT = 6
+"""Unit of boundaries that are brought back to rest from where a layer is now."""
+
+Pair = Sequence[float]
+_SCALE = 1 << FRACTION_BITS
+
+TARGET = "layer: a layer's name or position, or a group's name"
+PIVOT = "pair?: a canvas point x, y; by default the centre of the layer or group"
+
+
+def centre(layers: Sequence[Layer]) -> tuple[float, float]:
+    """The middle of what bounds layers, in canvas pixels; a multiple of 1/2048.
+
+    Sums of such bounds are exact, so that mirroring twice about the centre is too.
+    """
+    x0, y0, x1, y1 = bounds(layers)
+    return round((x0 + x1) * _SCALE) / (2 * _SCALE), round((y0 + y1) * _SCALE) / (2 * _SCALE)
+
+
+def bounds(layers: Sequence[Layer]) -> tuple[float, float, float, float]:
+    """x0, y0, x1, y1 of the rectangle round the present outlines of layers, in canvas pixels."""
+    points = []
+    for layer in layers:
+        assert layer.image is not None
+        shape = layer.outline
+        if shape is None:
+            points.append(np.array([[0, 0], [layer.image.width, layer.image.height]], float))
+        else:
+            points.append(sampled(shape))
+    every = np.concatenate(points)
+    (x0, y0), (x1, y1) = every.min(0).tolist(), every.max(0).tolist()
+    return x0, y0, x1, y1
+
+
+def sampled(boundary: Boundary) -> NDArray[np.float64]:
+    """Points [n, 2] along a boundary in canvas pixels: 16 a segment, exact."""
+    t = np.arange(16) / 16
+    weights = np.stack([(1 - t) ** 3, 3 * (1 - t) ** 2 * t, 3 * (1 - t) * t**2, t**3])
+    parts = []
+    for path in boundary.paths:
+        p = np.stack([path[0::3], path[1::3], path[2::3], np.roll(path[0::3], -1, 0)], 1)
+        parts.append(np.einsum("kt,skd->std", weights, p.astype(float)).reshape(-1, 2))
+    return np.asarray(np.concatenate(parts) / (1 << boundary.unit))
+
+
+def mapped(image: Image, target: str | int, matrix: Matrix, pivot: Pair | None, what: str) -> Image:
+    """The layers of a target under an affine map about a pivot.
+
+    Raises:
+        UsageError: The result is singular, or too large or too far away.
+    """
+    layers = members(image, target)
+    if pivot is None:
+        # Of a layer that others follow the centre is its own.
+        single = not (isinstance(target, str) and target in image.groups)
+        pivot = centre([one(image, target)] if single else layers)
+    x, y = pivot
+    about = product((1, 0, 0, 1, x, y), product(matrix, (1, 0, 0, 1, -x, -y)))
+    moved = []
+    for layer in layers:
+        values = fixed(product(about, layer.pose.floats))
+        if values is None:
+            raise UsageError(
+                f"{what}: layer {layer.name!r} would become singular, more than 127 times as "
+                "large, or leave the range of coordinates"
+            )
+        moved.append(replace(layer, pose=replace(layer.pose, matrix=values[0], shift=values[1])))
+    return substituted(image, moved)
+
+
+@operation("move", layer=TARGET, by="pair: dx, dy in canvas pixels")
+def move(image: Image, layer: str | int, by: Pair) -> Image:
+    """Moves a layer; there and back is exact."""
+    dx, dy = (round(v * _SCALE) for v in by)
+    moved = []
+    for each in members(image, layer):
+        e, f = each.pose.shift
+        pose = replace(each.pose, shift=(e + dx, f + dy))
+        if fixed(pose.floats) is None:
+            raise UsageError(f"move: layer {each.name!r} would leave the range of coordinates")
+        moved.append(replace(each, pose=pose))
+    return substituted(image, moved)
+
+
+@operation("rotate", layer=TARGET, degrees="number: an angle, clockwise", pivot=PIVOT)
+def rotate(image: Image, layer: str | int, degrees: float, pivot: Pair | None = None) -> Image:
+    """Turns a layer."""
+    turns, rest = divmod(degrees, 90)
+    c, s = math.cos(math.radians(rest)), math.sin(math.radians(rest))
+    for _ in range(int(turns % 4)):  # quarter turns are exact
+        c, s = -s, c
+    return mapped(image, layer, (c, s, -s, c, 0, 0), pivot, "rotate")
+
+
+@operation("scale", layer=TARGET, by="pair: factors across and down", pivot=PIVOT)
+def scale(image: Image, layer: str | int, by: Pair, pivot: Pair | None = None) -> Image:
+    """Makes a layer larger or smaller."""
+    return mapped(image, layer, (by[0], 0, 0, by[1], 0, 0), pivot, "scale")
+
+
+@operation("shear", layer=TARGET, by="pair: growth of x a pixel of y, and of y a pixel of x",
+           pivot=PIVOT)  # fmt: skip
+def shear(image: Image, layer: str | int, by: Pair, pivot: Pair | None = None) -> Image:
+    """Slants a layer."""
+    return mapped(image, layer, (1, by[1], by[0], 1, 0, 0), pivot, "shear")
+
+
+@operation("affine", layer=TARGET, matrix="matrix: a, b, c, d, e, f as in SVG", pivot=PIVOT)
+def affine(
+    image: Image, layer: str | int, matrix: Sequence[float], pivot: Pair | None = None
+) -> Image:
+    """Maps a layer by x' = a x + c y + e, y' = b x + d y + f, about the pivot."""
+    a, b, c, d, e, f = matrix
+    return mapped(image, layer, (a, b, c, d, e, f), pivot, "affine")
+
+
+@operation("flip", layer=TARGET, axis="axis: horizontal or vertical", pivot=PIVOT)
+def flip(
+    image: Image, layer: str | int, axis: str = "horizontal", pivot: Pair | None = None
+) -> Image:
+    """Mirrors a layer; twice is exact."""
+    across, down = (-1, 1) if axis == "horizontal" else (1, -1)
+    return mapped(image, layer, (across, 0, 0, down, 0, 0), pivot, "flip")
+
+
+def meshed(layer: Layer, edge: float | None = None) -> Layer:
+    """The layer with a mesh: its own, or one derived from its shape, with edges of length `edge`.
+
+    Lengths are relative to the diagonal of the shape; None = what suits edits.
+    """
+    if layer.mesh is not None:
+        return layer
+    assert layer.image is not None
+    size = (layer.image.width, layer.image.height)
+    edge = edge or (EDGE_BACK if layer.boundary is None else EDGE_FRONT)
+    return replace(layer, mesh=Mesh.build(mesher.delaunay(layer.boundary, size, edge)))
+
+
+@operation(
+    "drag",
+    layer="layer: a layer's name or position",
+    handles="handles: a list of 1 to 500 x, y, dx, dy: points of the layer and where they go",
+)
+def drag(image: Image, layer: str | int, handles: Sequence[Sequence[float]]) -> Image:
+    """Bends a layer so that points of it move; a point with 0, 0 stays."""
+    chosen = meshed(one(image, layer))
+    assert chosen.mesh is not None
+    refined, pose = chosen.mesh.refined, chosen.pose
+    values = np.array(handles, float)
+    present = pose.present(refined) / _SCALE
+    rest = pose.apply(refined.nodes) / _SCALE
+    moved = deform.drag(present, refined.faces, values[:, :2], values[:, :2] + values[:, 2:], rest)
+    return substituted(image, [replace(chosen, pose=_bent(chosen, moved))])
+
+
+def _bent(layer: Layer, present: NDArray[np.float64]) -> Pose:
+    """The pose that brings the nodes of a layer to present positions [N, 2] in pixels."""
+    assert layer.mesh is not None
+    pose = layer.pose
+    a, b, c, d, e, f = inverse(pose.floats)
+    x, y = present.T
+    back = np.stack([a * x + c * y + e, b * x + d * y + f], axis=1)
+    away = back - layer.mesh.refined.nodes / _SCALE
+    nodes = np.rint(away * (1 << NODE_BITS))
+    if not (np.abs(nodes) < NODE_MAX).all():
+        raise UsageError(f"drag: layer {layer.name!r} would leave the range of coordinates")
+    return replace(pose, nodes=nodes.astype(np.int64) if nodes.any() else None)
+
+
+@operation("point", layer="layer: a layer's name or position",
+           path="integer: a path of the boundary, counted from 0",
+           point="integer: a control point of the path, counted from 0",
+           by="pair: dx, dy in canvas pixels")  # fmt: skip
+def point(image: Image, layer: str | int, path: int, point: int, by: Pair) -> Image:
+    """Moves one control point of a boundary, in steps of the boundary's unit."""
+    chosen = one(image, layer)
+    shape = chosen.boundary
+    if shape is None:
+        raise UsageError(f"point: layer {chosen.name!r} has no boundary")
+    if not 0 <= path < len(shape.paths):
+        raise UsageError(f"point: layer {chosen.name!r} has paths 0..{len(shape.paths) - 1}")
+    points = shape.paths[path].copy()
+    if not 0 <= point < len(points):
+        raise UsageError(f"point: path {path} has control points 0..{len(points) - 1}")
+    a, b, c, d, _, _ = inverse(chosen.pose.floats)
+    step = np.array([a * by[0] + c * by[1], b * by[0] + d * by[1]]) * (1 << shape.unit)
+    if not (np.abs(points[point] + step) < COORDINATE_MAX).all():
+        raise UsageError("point: the control point would leave the range of coordinates")
+    points[point] += np.rint(step).astype(np.int64)
+    paths = (*shape.paths[:path], points, *shape.paths[path + 1 :])
+    return substituted(image, [replace(chosen, boundary=Boundary(shape.unit, paths))])
+
+
+@operation("outlines", source="text: the name of an SVG file, whose paths name layers")
+def outlines(image: Image, source: str) -> Image:
+    """Takes the boundaries of layers from an SVG file, such as `pxi-decode` writes."""
+    from ..io.files import read_bytes
+    from .outlines import load, same
+
+    new = []
+    for name, shape in load(image, read_bytes(source), source).items():
+        layer = one(image, name)
+        if layer.outline is None or not same(shape, layer.outline):
+            new.append(replace(layer, boundary=_at_rest(layer, shape)))
+    return substituted(image, new)
+
+
+def _at_rest(layer: Layer, shape: Boundary) -> Boundary:
+    """The boundary whose outline, in the pose of a layer, is `shape`.
+
+    Raises:
+        UsageError: The layer is bent, or the boundary leaves the range of coordinates.
+    """
+    pose = layer.pose
+    if pose.nodes is not None:
+        raise UsageError(f"outlines: layer {layer.name!r} is bent; undo that first")
+    if not pose.affine:
+        return shape
+    a, b, c, d, e, f = inverse(pose.floats)
+    paths = []
+    for path in shape.paths:
+        x, y = (path / (1 << shape.unit)).T
+        points = np.stack([a * x + c * y + e, b * x + d * y + f], axis=1) * (1 << REST_UNIT)
+        if not (np.abs(points) < COORDINATE_MAX).all():
+            raise UsageError(f"outlines: layer {layer.name!r} would leave the range of coordinates")
+        paths.append(np.rint(points).astype(np.int64))
+    return Boundary(REST_UNIT, tuple(paths))

@@ -1,0 +1,1 @@
+"""What lies where a layer is hidden by those in front of it."""

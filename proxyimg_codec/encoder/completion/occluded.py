@@ -1,0 +1,125 @@
+"""What a back layer learns where others hide it: the colours around, continued smoothly.
+
+Without such pixels, codes at the rim of an object are bent by the few visible pixels they touch,
+and the network is free to make anything of the codes that decoders fill in between.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ...texture.network import Floats
+from ..implicit.fit_problem import Problem, entries_of, prior_of
+
+BAND = 6
+"""Pixels from the rim up to which all hidden pixels are learnt; these reach the stored codes."""
+
+LATTICE = 3
+"""Farther inside, one pixel in LATTICE x LATTICE is enough: codes there are smooth."""
+
+KNOWN, RIM = 1e4, 8.0
+"""Weights of visible pixels, and of those at the rim, whose colour may be mixed with the front's;
+a neighbour weighs 1."""
+
+SWEEPS = 16
+"""Jacobi sweeps at each level."""
+
+CROSS = np.array([[0, 1, 0], [1, 0, 1], [0, 1, 0]], np.float32)
+
+
+@dataclass(frozen=True, eq=False)
+class Extended(Problem):
+    """A problem with hidden pixels after the visible ones.
+
+    Attributes:
+        seen: What the visible pixels touch.
+    """
+
+    seen: tuple[NDArray[np.bool_], ...]
+
+    def stored(self) -> list[NDArray[np.bool_]]:
+        """As without the hidden pixels: what they teach costs no codes."""
+        return [mask.copy() for mask in self.seen]
+
+
+def extended(problem: Problem, width: int, height: int, spacing: float) -> Problem:
+    """The problem, and hidden pixels of the back layer, which it learns alone.
+
+    Args:
+        problem: Of a canvas that the back layer covers, so that it has all pixels in order.
+        width: Columns of the canvas.
+        height: Its rows.
+        spacing: Canvas pixels between codes.
+    """
+    assert problem.pixels == width * height, "the back layer must cover the canvas"
+    back = problem.planes[0]
+    rearmost = problem.first[1:] - 1
+    free = (problem.base[rearmost] < back.size) & (problem.learn[rearmost] > 0)
+    if free.all() or not free.any():
+        return problem
+    at, colour = _lesson(problem.target.reshape(height, width, -1), ~free.reshape(height, width))
+    ones = np.ones(len(at), np.float32)
+    base, stride, fx, fy, coverage, learn = (
+        np.concatenate([getattr(problem, name), more])
+        for name, more in zip(
+            ("base", "stride", "fx", "fy", "coverage", "learn"),
+            entries_of(back, at, width, ones, ones),
+            strict=True,
+        )
+    )
+    end = problem.first[-1] + np.arange(1, len(at) + 1, dtype=np.int32)
+    target = np.concatenate([problem.target, colour])
+    weight = coverage * learn
+    return Extended(
+        problem.shape, problem.planes, np.concatenate([problem.first, end]),
+        base, stride, fx, fy, coverage, learn, target,
+        prior_of(problem.planes, spacing, len(target), base, stride, fx, fy, weight),
+        problem.areas, tuple(problem.stored()),
+    )  # fmt: skip
+
+
+def _lesson(picture: Floats, hidden: NDArray[np.bool_]) -> tuple[NDArray[np.int64], Floats]:
+    """Flat positions [N] of hidden pixels to learn and their colours [N, C].
+
+    Args:
+        picture: [H, W, C] visible pixels.
+        hidden: bool [H, W], where something hides the back layer.
+    """
+    mask = hidden.astype(np.uint8)
+    weight = np.where(cv2.dilate(mask, np.ones((3, 3), np.uint8)) > 0, RIM, KNOWN)
+    colour = continued(picture, np.where(hidden, 0, weight).astype(np.float32))
+    # Rounding must not take a mean out of the range of its terms: flat pictures stay flat.
+    colour = np.clip(colour, picture[~hidden].min(0), picture[~hidden].max(0))
+    chosen = cv2.distanceTransform(mask, cv2.DIST_L2, 5) <= BAND
+    chosen[LATTICE // 2 :: LATTICE, LATTICE // 2 :: LATTICE] = True
+    at = np.flatnonzero(chosen & hidden)
+    return at, colour.reshape(-1, picture.shape[2])[at]
+
+
+def continued(value: Floats, weight: Floats) -> Floats:
+    """Values [H, W, C] that are smooth and near `value` where it has weight [H, W].
+
+    Minimizes approximately the squared differences of neighbours plus weight times those from
+    `value` (a screened membrane), by pull and push as the normative diffusion of codes: each level
+    halves the picture, is solved, and starts the finer one.
+    """
+    h, w = weight.shape
+    start = value
+    if max(h, w) > 1:
+        pad = ((0, h % 2), (0, w % 2))
+        blocks = ((h + 1) // 2, 2, (w + 1) // 2, 2)
+        total = np.pad(weight, pad).reshape(blocks).sum((1, 3))
+        mean = np.pad(value * weight[..., None], (*pad, (0, 0))).reshape(*blocks, -1).sum((1, 3))
+        mean /= np.maximum(total, np.float32(1e-6))[..., None]
+        coarse = continued(mean, np.minimum(total, np.float32(KNOWN)))
+        start = coarse[np.arange(h)[:, None] // 2, np.arange(w) // 2]
+    share = 1 / (4 + weight[..., None])
+    own = value * weight[..., None] * share
+    for _ in range(SWEEPS):
+        around = cv2.filter2D(start, -1, CROSS, borderType=cv2.BORDER_REPLICATE)
+        start = np.asarray(around * share + own, np.float32)
+    return start

@@ -1,0 +1,1 @@
+"""Fitting codes and networks of implicit textures."""

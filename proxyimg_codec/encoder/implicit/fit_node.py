@@ -1,0 +1,147 @@
+"""Fitting with node sampling: float parameters with torch, then rounding by block reconstruction.
+
+How ProxyImg trains is not known in full. Here it is as for direct sampling: Adam on random batches
+of pixels, through the compositing, with a warm-up and a cosine decay.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...texture import node_sampling
+from . import fit
+from .fit_torch import TorchTrainer, interpolate
+from .node_problem import NodeProblem
+from .rounding import Model, reconstruct
+
+INIT_CODES = 0.03
+"""Standard deviation of initial codes."""
+
+LR_CODES, LR_NET = 2e-3, 2e-3
+"""Peak learning rates."""
+
+FLOAT_SHARE = 2 / 3
+"""Share of the steps before rounding."""
+
+CALIBRATION = 1 << 14
+"""Most points that the rounding looks at."""
+
+
+class NodeTrainer(TorchTrainer):
+    """Trains a `NodeProblem`."""
+
+    def __init__(self, problem: NodeProblem, device: str) -> None:
+        # Sums, and so the file, would depend on the number of threads.
+        super().__init__(problem, device, jobs=1)
+        self._layer = self.tensor(problem.layer)
+        self._place = self.tensor(problem.place)
+        self._corners = self.tensor(problem.corners)
+        self._weights = self.tensor(problem.weights)
+        self._anchors = [(first, self.tensor(at)) for first, at in problem.anchors]
+
+    def features(self, codes: Any, entry: Any) -> Any:
+        """Features of entries, before the encoding."""
+        points = interpolate(codes, *self._taps)
+        parts = []
+        if self._corners.shape[1]:
+            corners = points.index_select(0, self._corners[entry].reshape(-1))
+            corners = corners.reshape(len(entry), 3, -1)
+            parts.append((corners * self._weights[entry][:, :, None]).sum(1))
+        if self._anchors:
+            parts.append(self._global(points, self._layer[entry], self._place[entry]))
+        return self._torch.cat(parts, 1)
+
+    def _global(self, points: Any, layer: Any, place: Any) -> Any:
+        torch = self._torch
+        out = points.new_zeros((len(layer), points.shape[1]))
+        for k, (first, anchors) in enumerate(self._anchors):
+            at = torch.nonzero(layer == k)[:, 0]
+            square = ((place[at, None] - anchors) ** 2).sum(2)
+            weight = 1 / square.clamp(min=node_sampling.NEAR)
+            weight = weight / weight.sum(1, keepdim=True)
+            out = out.index_copy(0, at, weight @ points[first : first + len(anchors)])
+        return out
+
+
+def initial(problem: NodeProblem, seed: int) -> fit.State:
+    """Random codes and weights; the output bias is the mean colour."""
+    state = fit.initial(problem, seed)
+    dim = problem.shape.dim // (bool(problem.anchors) + bool(problem.corners.shape[1]))
+    scale = np.float32(INIT_CODES / fit.INIT_CODES)
+    state.codes = np.ascontiguousarray(state.codes[:, :dim]) * scale
+    state.code_steps = np.ones((len(problem.planes), dim), np.float32)
+    return state
+
+
+def fit_float(
+    problem: NodeProblem,
+    trainer: NodeTrainer,
+    steps: int,
+    seed: int,
+    progress: fit.Progress | None = None,
+) -> fit.State:
+    """Fits unquantized parameters from a random start."""
+    state = initial(problem, seed)
+    fit.train(problem, state, trainer, steps, (LR_CODES, LR_NET), seed, progress)
+    return state
+
+
+def quantize(
+    problem: NodeProblem,
+    trainer: NodeTrainer,
+    state: fit.State,
+    bits: tuple[int, int],
+    steps: int,
+    seed: int,
+    progress: fit.Progress | None = None,
+) -> None:
+    """Makes codes and weights of a float `state` multiples of steps, which it chooses.
+
+    Args:
+        problem: What the state was fitted to.
+        trainer: Of the problem.
+        state: Changed in place.
+        bits: Bits a code and a weight.
+        steps: Optimizer steps of the block reconstruction.
+        seed: Of everything random.
+        progress: Told how many steps were done.
+    """
+    fit.choose_steps(problem, state, *bits)
+    plane = np.repeat(np.arange(len(problem.planes)), [p.size for p in problem.planes])
+    rows = fit.rows_of(problem.shape, state.weights)
+    flat = [a for pair in rows for a in pair]
+    ends = np.cumsum([o for _, o in problem.shape.layers])[:-1]
+    model = Model(
+        trainer.tensor(state.codes),
+        trainer.tensor(state.code_steps[plane]),
+        [trainer.tensor(a) for a in flat],
+        [trainer.tensor(s[:, None]) for s in np.split(state.row_steps, ends)],
+        problem.shape.octaves,
+    )
+    entries = np.random.default_rng([seed, 2]).permutation(np.flatnonzero(problem.learn > 0))
+    chosen = trainer.tensor(np.sort(entries[:CALIBRATION]))
+    codes, net = reconstruct(
+        model, lambda c, at: trainer.features(c, chosen[at]), len(chosen), bits, steps, seed,
+        progress,
+    )  # fmt: skip
+    for array, tensor in zip((state.codes, *flat), (codes, *net), strict=True):
+        array[...] = tensor.cpu().numpy()
+
+
+def fit_quantized(
+    problem: NodeProblem,
+    steps: int,
+    code_bits: int,
+    net_bits: int,
+    seed: int,
+    device: str = "cpu",
+    progress: fit.Progress | None = None,
+) -> fit.State:
+    """Fits float parameters, then rounds them; as `fit.fit` for direct sampling."""
+    trainer = NodeTrainer(problem, device)
+    first = round(FLOAT_SHARE * steps)
+    state = fit_float(problem, trainer, first, seed, progress)
+    quantize(problem, trainer, state, (code_bits, net_bits), steps - first, seed, progress)
+    return state

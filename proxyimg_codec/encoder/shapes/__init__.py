@@ -1,0 +1,1 @@
+"""From a picture to named layers: regions, contours, Bézier paths, meshes."""

@@ -1,0 +1,144 @@
+"""From a picture to named layers with boundaries, back to front."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import plugins
+from ...errors import InputError
+from ...geometry.boundary import Boundary
+from ...geometry.mesh import Mesh
+from ...texture.network import Floats
+from ..implicit.fit_problem import LAYERS_MAX
+from ..settings import Settings
+from .contours import fit_paths
+from .masks import Region, resolve
+
+UNIT = 2
+"""Boundaries are fitted in quarters of a pixel."""
+
+OVERLAP = 3
+"""Pixels that a layer reaches under those in front of it, so that nothing shines through."""
+
+SOFT_PIXELS = 16
+"""Textures give alpha if that many translucent pixels hang together away from outlines."""
+
+FINE_PIXELS = 1 << 20
+"""Up to this size outlines of transparent pictures are traced on a finer grid."""
+
+FINE = 2
+"""Binary digits of that grid: quarters of a pixel."""
+
+FINE_TOLERANCE: dict[str, dict[str, float]] = {"lsq": {"tolerance": 1.2}, "chamfer": {}}
+"""Fit tolerance there, in quarters of a pixel."""
+
+
+@dataclass(frozen=True, eq=False)
+class LayerPlan:
+    """A layer to be: its name, boundary (None = the whole canvas), and mesh."""
+
+    name: str
+    boundary: Boundary | None
+    mesh: Mesh | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Layers back to front, the channels of their textures, and whether they cover the canvas."""
+
+    layers: tuple[LayerPlan, ...]
+    channels: int
+    opaque: bool
+
+
+def plan_layers(picture: Floats, settings: Settings, masks: Sequence[Region] | None) -> Plan:
+    """Decomposes a picture [H, W, 4] with straight alpha.
+
+    Raises:
+        InputError: A mask does not fit the picture.
+    """
+    height, width = picture.shape[:2]
+    alpha = picture[..., 3]
+    opaque = bool((alpha == 1).all())
+    translucent = _translucent(alpha)
+    sizes = cv2.connectedComponentsWithStats(translucent.astype(np.uint8))[2][1:, cv2.CC_STAT_AREA]
+    soft = bool(sizes.max(initial=0) >= SOFT_PIXELS)
+    support = None if opaque else alpha >= 0.5
+    if support is not None and soft:
+        # Crisp outlines stay where they are; only translucent parts reach beyond.
+        around = _dilate(translucent, 3)
+        support |= around if settings.pyramid else around & (alpha > 0)
+    if support is not None and not support.any():
+        return Plan((LayerPlan("empty", None),), 4, False)
+    if masks is not None:
+        _check_masks(masks)
+        regions = resolve(masks, height, width, support)
+    elif settings.max_layers == 1:
+        whole = np.ones((height, width), bool) if support is None else support
+        regions = [Region("picture", whole)]
+    else:
+        rgb = np.rint(picture[..., :3] * 255).astype(np.uint8)
+        segment = plugins.find("segmenters", settings.segmenter)
+        regions = segment(rgb, settings.max_layers, support)
+    outline = alpha if not opaque and not soft and height * width <= FINE_PIXELS else None
+    # Planes hold one alpha a sample: layers on top of each other would show it twice.
+    overlap = 0 if soft and settings.pyramid else OVERLAP
+    layers = []
+    for k, region in enumerate(regions):
+        if opaque and k == 0:
+            layers.append(LayerPlan(region.name, None))
+            continue
+        front = np.zeros((height, width), bool)
+        for other in regions[k + 1 :]:
+            front |= other.mask
+        mask = region.mask | (_dilate(region.mask, overlap) & front)
+        layers.append(LayerPlan(region.name, _boundary(mask, outline, settings)))
+    return Plan(tuple(layers), 4 if soft else 3, opaque)
+
+
+def _boundary(mask: NDArray[np.bool_], outline: Floats | None, settings: Settings) -> Boundary:
+    """Fits a mask; with `outline`, an alpha plane, at the resolution of the stored units."""
+    fit_method: Callable[..., list[NDArray[np.int64]]] = fit_paths
+    if settings.boundary == "chamfer":
+        from .chamfer import fit_paths_chamfer
+
+        fit_method = fit_paths_chamfer
+    if outline is None:
+        return Boundary(UNIT, tuple(fit_method(mask, step=2.0**-UNIT)))
+    size = (mask.shape[1] << FINE, mask.shape[0] << FINE)
+    inside = cv2.resize(outline, size, interpolation=cv2.INTER_LINEAR) >= 0.5
+    # One pixel of slack: alpha >= 0.5 between pixels may lie just outside the pixel mask.
+    near = cv2.resize(_dilate(mask, 1).astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)
+    fine = inside & (near > 0)
+    if not fine.any():
+        fine = cv2.resize(mask.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
+    return Boundary(
+        FINE + 1, tuple(fit_method(fine, step=0.5, **FINE_TOLERANCE[settings.boundary]))
+    )
+
+
+def _dilate(mask: NDArray[np.bool_], radius: int) -> NDArray[np.bool_]:
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1))
+    return cv2.dilate(mask.astype(np.uint8), kernel) > 0
+
+
+def _check_masks(masks: Sequence[Region]) -> None:
+    if len(masks) > LAYERS_MAX:
+        raise InputError(f"{len(masks)} masks are too many; at most {LAYERS_MAX} are possible")
+    for region in masks:
+        if not 1 <= len(region.name) <= 200 or not region.name.isprintable():
+            raise InputError(f"mask name {region.name!r} must be 1..200 printable characters")
+        if region.mask.dtype != bool:
+            raise InputError(f"mask {region.name!r} is not an array of bool")
+
+
+def _translucent(alpha: Floats) -> NDArray[np.bool_]:
+    """Pixels between clear and solid that are not the smooth rim of an outline."""
+    inside = alpha >= 0.5
+    rim = _dilate(inside, 2) & _dilate(~inside, 2)
+    return (alpha > 0.03) & (alpha < 0.97) & ~rim

@@ -1,0 +1,1 @@
+"""Raster files, their metadata, XML, and whole files."""

@@ -1,0 +1,78 @@
+"""Reading and writing whole files; a failed write never leaves half a file or loses an old one."""
+
+from __future__ import annotations
+
+import errno
+import os
+import sys
+import tempfile
+from pathlib import Path
+from typing import BinaryIO, TextIO
+
+from ..errors import InputError
+
+
+def read_bytes(path: str | os.PathLike[str]) -> bytes:
+    """The bytes of a file; ``-`` is standard input.
+
+    Raises:
+        InputError: It cannot be read.
+    """
+    try:
+        if os.fspath(path) == "-":
+            return _standard(sys.stdin).read()
+        return Path(path).read_bytes()
+    except OSError as error:
+        raise InputError(f"{_name(path, 'input')}: cannot be read: {error.strerror}") from None
+
+
+def _name(path: str | os.PathLike[str], kind: str) -> str:
+    return f"standard {kind}" if os.fspath(path) == "-" else os.fspath(path)
+
+
+def _standard(stream: TextIO | None) -> BinaryIO:
+    """The bytes of a standard stream; Python has None where it was closed from the start."""
+    if stream is None:
+        raise OSError(errno.EBADF, "it is closed")
+    return stream.buffer
+
+
+def write_atomically(path: str | os.PathLike[str], data: bytes) -> None:
+    """Writes a file under a temporary name in its folder and renames it.
+
+    A link stays a link; pipes and devices are written to directly; ``-`` is standard output.
+
+    Raises:
+        InputError: It cannot be written; an old file is still there.
+    """
+    temporary = None
+    try:
+        if os.fspath(path) == "-":
+            stream = _standard(sys.stdout)
+            stream.write(data)
+            stream.flush()
+            return
+        if os.path.exists(path) and not os.path.isfile(path):
+            with open(path, "wb") as stream:
+                stream.write(data)
+            return
+        target = Path(os.path.realpath(path))
+        fd, temporary = tempfile.mkstemp(prefix=".pxi-", dir=target.parent)
+        with os.fdopen(fd, "wb") as stream:
+            stream.write(data)
+            stream.flush()
+            os.fsync(stream.fileno())
+        umask = os.umask(0)
+        os.umask(umask)
+        mode = target.stat().st_mode & 0o777 if target.exists() else 0o666 & ~umask
+        os.chmod(temporary, mode)
+        os.replace(temporary, target)
+        temporary = None
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        name = _name(path, "output")
+        raise InputError(f"{name}: cannot be written: {error.strerror}") from None
+    finally:
+        if temporary is not None and os.path.exists(temporary):
+            os.unlink(temporary)

@@ -1,0 +1,1 @@
+"""The compiled kernel and its binding; all of it is optional."""

@@ -1,0 +1,1 @@
+"""Whether a file is valid, and what is odd about it."""
