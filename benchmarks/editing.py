@@ -22,7 +22,7 @@ from benchmarks.common import Pixels, centre_crop, header, kodak, read_rgb, run_
 from proxyimg_codec.container import mesh as mesh_chunk
 from proxyimg_codec.container.chunks import Chunk
 from proxyimg_codec.container.fields import pack
-from proxyimg_codec.encoder.encode import to_float
+from proxyimg_codec.io.samples import to_float
 from proxyimg_codec.encoder.settings import Settings
 from proxyimg_codec.encoder.shapes.layers import plan_layers
 from proxyimg_codec.encoder.shapes.masks import Region

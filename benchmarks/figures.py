@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.common import Pixels, centre_crop, header, kodak, read_rgb, run_limited
-from proxyimg_codec.encoder.encode import encode, to_float
+from proxyimg_codec.encoder.encode import encode
+from proxyimg_codec.io.samples import to_float
 from proxyimg_codec.encoder.implicit import fit
 from proxyimg_codec.encoder.implicit.fit_problem import build
 from proxyimg_codec.encoder.settings import Settings

@@ -23,7 +23,8 @@ import numpy as np
 
 from benchmarks.common import Pixels, centre_crop, header, kodak, read_rgb
 from benchmarks.figures import fit_float
-from proxyimg_codec.encoder.encode import encode, to_float
+from proxyimg_codec.encoder.encode import encode
+from proxyimg_codec.io.samples import to_float
 from proxyimg_codec.encoder.implicit import fit_node, node_problem
 from proxyimg_codec.encoder.implicit.fit_problem import Problem, build
 from proxyimg_codec.encoder.implicit.node_problem import NodeOptions, NodeProblem

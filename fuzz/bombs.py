@@ -25,7 +25,7 @@ import zstandard
 from proxyimg_codec import from_bytes
 from proxyimg_codec.container import file, undo
 from proxyimg_codec.container.chunks import Chunk, write
-from proxyimg_codec.container.file import Container
+from proxyimg_codec.container.content import Container
 from proxyimg_codec.entropy import arrays
 from proxyimg_codec.errors import PxiError
 from proxyimg_codec.geometry import deltas

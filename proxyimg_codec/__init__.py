@@ -26,21 +26,21 @@ from .errors import (
 from .limits import Limits
 
 if TYPE_CHECKING:
-    from .encoder.encode import encode as encode
+    from .api import Image as Image
+    from .api import Layer as Layer
+    from .api import encode as encode
+    from .api import from_bytes as from_bytes
+    from .api import open_image as open
     from .encoder.settings import Settings as Settings
     from .encoder.shapes.masks import Region as Region
-    from .image import Image as Image
-    from .image import Layer as Layer
-    from .image import from_bytes as from_bytes
-    from .image import open_image as open
 
 _LAZY = {
-    "Image": ("image", "Image"),
-    "Layer": ("image", "Layer"),
-    "open": ("image", "open_image"),
-    "from_bytes": ("image", "from_bytes"),
-    "encode": ("encoder.encode", "encode"),
-    "Region": ("encoder.masks", "Region"),
+    "Image": ("api", "Image"),
+    "Layer": ("api", "Layer"),
+    "open": ("api", "open_image"),
+    "from_bytes": ("api", "from_bytes"),
+    "encode": ("api", "encode"),
+    "Region": ("encoder.shapes.masks", "Region"),
     "Settings": ("encoder.settings", "Settings"),
 }
 

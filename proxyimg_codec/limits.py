@@ -1,13 +1,14 @@
 """What a reader is willing to spend on a file. Every number read from a file is checked here.
 
 What a file asks for is added up over all its parts, before it is done: whoever decodes a file, or
-draws a picture, makes one `Budget` of the limits, which all stages draw from.
+draws a picture, makes one `Budget` of the limits, which all stages draw from. Public functions take
+`Limits`; what takes a `Budget` is one of those stages.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 
 from .errors import LimitError
 
@@ -93,47 +94,42 @@ class Limits:
                 rule="SEC-2",
             )
 
+
+class Budget:
+    """Limits of which all that is done for one file, or for one picture, is taken.
+
+    Attributes:
+        limits: What may be spent.
+        spent: What was spent so far, by the name of its limit.
+    """
+
+    def __init__(self, limits: Limits | None = None) -> None:
+        self.limits = limits or DEFAULT_LIMITS
+        self.spent: Counter[str] = Counter()
+
+    def check(self, name: str, value: int) -> None:
+        """Raises `LimitError` if `value` alone exceeds the limit called `name`."""
+        self.limits.check(name, value)
+
     def spend(self, name: str, amount: int) -> None:
-        """Checks `amount`, in a `Budget` together with all that was spent before.
+        """Spends `amount` of the limit called `name`.
 
         Raises:
-            LimitError: It exceeds the limit called `name`.
+            LimitError: Together with what was spent before it exceeds the limit.
         """
-        self.check(name, amount)
-
-    def left(self, name: str) -> int:
-        """How much may still be spent of the limit called `name`."""
-        return int(getattr(self, name))
-
-    def budget(self) -> Budget:
-        """A budget of which nothing is spent; of a budget itself, what is left of it."""
-        return Budget(**{f.name: getattr(self, f.name) for f in fields(Limits)})
-
-
-@dataclass(frozen=True)
-class Budget(Limits):
-    """Limits of which all that is done for one file, or one picture, is taken."""
-
-    spent: Counter[str] = field(default_factory=Counter)
-
-    def spend(self, name: str, amount: int) -> None:
-        """Spends `amount`; see `Limits.spend`."""
         self.spent[name] += amount
         self.check(name, self.spent[name])
         if 0 < self.spent["file_bytes"] <= SMALL_FILE and name in SMALL:
             self.check(SMALL[name], self.spent[name])
 
     def left(self, name: str) -> int:
-        """See `Limits.left`."""
-        return super().left(name) - self.spent[name]
-
-    def budget(self) -> Budget:
-        """Itself."""
-        return self
+        """How much may still be spent of the limit called `name`."""
+        return int(getattr(self.limits, name)) - self.spent[name]
 
     def fits_small(self) -> bool:
         """Whether a small file may hold what was spent."""
-        return all(self.spent[name] <= getattr(self, small) for name, small in SMALL.items())
+        limits = self.limits
+        return all(self.spent[name] <= getattr(limits, small) for name, small in SMALL.items())
 
 
 SMALL = {f.name.removeprefix("small_"): f.name for f in fields(Limits) if "small_" in f.name}

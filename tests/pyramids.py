@@ -9,7 +9,7 @@ from conformance.builders import Numbers, ellipse, network, polygon, texture
 from proxyimg_codec.container import plan
 from proxyimg_codec.geometry.boundary import Boundary
 from proxyimg_codec.image import Image, Layer, Layers
-from proxyimg_codec.texture.cuts import Cuts
+from proxyimg_codec.texture.occlusion import Occlusion
 from proxyimg_codec.texture.planes import Planes
 from proxyimg_codec.texture.pyramid import PyramidTexture
 
@@ -88,7 +88,7 @@ def cut_picture(source=None, alpha=None):
     for k, (name, box, numbers) in enumerate(
         zip(("back", "bar", "disc"), boxes, ([1, 2], [1, 2], [2]), strict=True)
     ):
-        cuts = Cuts.of(numbers, k, boundaries, box)
+        cuts = Occlusion.of(numbers, k, boundaries, box)
         stack.append(Layer(name, box, boundaries[k], view(source, alpha, box, cuts=cuts)))
     info = {"encoder": "", "settings": "", "areas": [1900, 700, 615]}
     return Image(*SIZE, channels, alpha is None, 8, Layers(stack), (), info=info)

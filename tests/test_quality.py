@@ -8,7 +8,7 @@ import pytest
 
 import proxyimg_codec as pxi
 from proxyimg_codec.io import raster
-from proxyimg_codec.io.psnr import psnr
+from proxyimg_codec.render.quality import psnr
 
 PSNR, BYTES = 29.4, 6600
 PHOTO = Path(__file__).parents[1] / "docs" / "images" / "photo.png"

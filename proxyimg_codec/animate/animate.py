@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ..edit.transforms import meshed
 from ..errors import UsageError
+from ..geometry import mesher
 from ..geometry.mesh import FRACTION_BITS
-from ..image import Image, Layer, Layers
+from ..model import Layer, Layers, Picture, Pictured
 from . import motion as motions
 from .bake import bake
 from .body import Body
@@ -24,12 +24,13 @@ EDGE = 0.035
 """Edges of meshes that are made for motion, relative to the diagonal of a layer."""
 
 
-def movable(image: Image) -> list[Layer]:
+def movable(image: Pictured) -> list[Layer]:
     """The layers that can move: all that are drawn but the back layer of an opaque picture."""
-    return [v for i, v in enumerate(image.layers) if not v.pose.hidden and (i or not image.opaque)]
+    layers = list(image.picture.layers)
+    return [v for v in layers[image.picture.opaque :] if not v.pose.hidden]
 
 
-def boxes(image: Image, names: Sequence[str | int] | None = None) -> dict[str, Box]:
+def boxes(image: Pictured, names: Sequence[str | int] | None = None) -> dict[str, Box]:
     """x0, y0, x1, y1 in canvas pixels, at rest, of layers by name.
 
     Args:
@@ -39,12 +40,13 @@ def boxes(image: Image, names: Sequence[str | int] | None = None) -> dict[str, B
     Raises:
         UsageError: There is no such layer, it cannot move, or no layer can.
     """
-    return {v.name: _box(v, image) for v in _chosen(image, names)}
+    picture = image.picture
+    return {v.name: _box(v, picture.size) for v in _chosen(picture, names)}
 
 
-def _chosen(image: Image, names: Sequence[str | int] | None) -> list[Layer]:
-    able = movable(image)
-    chosen = able if names is None else [image.layers[k] for k in names]
+def _chosen(picture: Picture, names: Sequence[str | int] | None) -> list[Layer]:
+    able = movable(picture)
+    chosen = able if names is None else [picture.layers[k] for k in names]
     for layer in chosen:
         if layer not in able:
             why = "hidden" if layer.pose.hidden else "the back of an opaque picture"
@@ -56,15 +58,15 @@ def _chosen(image: Image, names: Sequence[str | int] | None) -> list[Layer]:
     return chosen
 
 
-def _box(layer: Layer, image: Image) -> Box:
+def _box(layer: Layer, size: tuple[int, int]) -> Box:
     if layer.boundary is None:
-        return (0.0, 0.0, float(image.width), float(image.height))
+        return (0.0, 0.0, float(size[0]), float(size[1]))
     left, top, right, bottom = layer.boundary.bounds()
     return (float(left), float(top), float(right), float(bottom))
 
 
 def preset(
-    image: Image,
+    image: Pictured,
     name: str,
     names: Sequence[str | int] | None = None,
     *,
@@ -83,13 +85,14 @@ def preset(
     Raises:
         UsageError: There is no such preset or layer, or an option makes no sense.
     """
-    chosen = _chosen(image, names)
+    picture = image.picture
+    chosen = _chosen(picture, names)
     groups = [[i] for i in range(len(chosen))]
     if together:
-        groups = touching(chosen, (image.width, image.height))
+        groups = touching(chosen, picture.size)
     wholes = {}
     for group in groups:
-        x0, y0, x1, y1 = zip(*(_box(chosen[i], image) for i in group), strict=True)
+        x0, y0, x1, y1 = zip(*(_box(chosen[i], picture.size) for i in group), strict=True)
         wholes[chosen[group[0]].name] = (min(x0), min(y0), max(x1), max(y1))
     made = motions.preset(name, wholes, **options)
     layers = {chosen[i].name: made.layers[chosen[g[0]].name] for g in groups for i in g}
@@ -97,12 +100,12 @@ def preset(
 
 
 def animate(
-    image: Image, motion: Motion, progress: Callable[[int, int], None] | None = None
-) -> Image:
+    picture: Picture, motion: Motion, progress: Callable[[int, int], None] | None = None
+) -> Picture:
     """The picture with a motion instead of the one it may have.
 
     Args:
-        image: The picture.
+        picture: The picture.
         motion: What moves, and how.
         progress: Called with the number of simulated frames and of all frames to simulate.
 
@@ -110,12 +113,12 @@ def animate(
         UsageError: The motion does not fit the picture.
         LimitError: Nodes are flung out of reach.
     """
-    able = _chosen(image, None)
+    able = _chosen(picture, None)
     for name in motion.layers:
-        if name != "*" and name in (v.name for v in image.layers):
-            _chosen(image, [name])
-    size = (image.width, image.height)
-    meshed_layers = {v.name: meshed(v, EDGE) for v in able}
+        if name != "*" and name in (v.name for v in picture.layers):
+            _chosen(picture, [name])
+    size = picture.size
+    meshed_layers = {v.name: _meshed(v, size) for v in able}
     bodies = [_body(v) for v in meshed_layers.values()]
     riders: dict[str, list[str]] = {}
     acting = motion
@@ -149,9 +152,15 @@ def animate(
         replace(meshed_layers[v.name], track=track[v.name])
         if v.name in track
         else replace(v, track=None)
-        for v in image.layers
+        for v in picture.layers
     ]
-    return replace(image, layers=Layers(layers), timeline=timeline)
+    return replace(picture, layers=Layers(layers), timeline=timeline)
+
+
+def _meshed(layer: Layer, size: tuple[int, int]) -> Layer:
+    if layer.mesh is not None:
+        return layer
+    return replace(layer, mesh=mesher.derived(layer.boundary, size, EDGE))
 
 
 def _body(layer: Layer) -> Body:
@@ -177,16 +186,17 @@ def _riders(layers: Sequence[Layer], motion: Motion, size: tuple[int, int]) -> d
     return found
 
 
-def amplitude(image: Image, frames: int = 24) -> float:
+def amplitude(image: Pictured, frames: int = 24) -> float:
     """Mean displacement of the nodes that move, over the timeline, in canvas pixels."""
-    if image.timeline is None:
+    picture = image.picture
+    if picture.timeline is None:
         return 0.0
     total, count = 0.0, 0
-    for layer in image.layers:
+    for layer in picture.layers:
         if layer.track is None:
             continue
         for k in range(frames):
-            at = layer.track.at(image.timeline, image.timeline.seconds * k / frames)
+            at = layer.track.at(picture.timeline, picture.timeline.seconds * k / frames)
             total += float(np.hypot(*at.T).sum()) / (1 << FRACTION_BITS)
             count += len(at)
     return total / max(count, 1)

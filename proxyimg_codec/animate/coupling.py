@@ -15,7 +15,7 @@ from ..geometry import coverage as cover
 from ..geometry.boundary import Boundary
 from ..geometry.mesh import FRACTION_BITS, Mesh
 from ..geometry.mesher import delaunay
-from ..image import Layer
+from ..model import Layer
 from .body import Body
 
 Size = tuple[int, int]

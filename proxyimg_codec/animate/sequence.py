@@ -11,10 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UsageError
-from ..image import Image
+from ..model import Pictured
+from ..render.cache import Cache
+from ..render.pixels import render
 
 
-def times(image: Image, *, duration: float | None = None, fps: float | None = None) -> list[float]:
+def times(
+    image: Pictured, *, duration: float | None = None, fps: float | None = None
+) -> list[float]:
     """The times of the frames of a clip in seconds.
 
     Args:
@@ -25,10 +29,11 @@ def times(image: Image, *, duration: float | None = None, fps: float | None = No
     Raises:
         UsageError: The picture does not move, or a number makes no sense.
     """
-    if image.timeline is None:
+    timeline = image.picture.timeline
+    if timeline is None:
         raise UsageError("the picture does not move; give it a motion first (pxi-animate)")
-    duration = image.timeline.seconds if duration is None else duration
-    fps = image.timeline.fps if fps is None else fps
+    duration = timeline.seconds if duration is None else duration
+    fps = timeline.fps if fps is None else fps
     if not (0 < fps <= 240 and 0 < duration <= 3600):
         raise UsageError(
             f"{duration:g} s at {fps:g} frames a second: up to 3600 s, and 240 a second"
@@ -37,7 +42,7 @@ def times(image: Image, *, duration: float | None = None, fps: float | None = No
 
 
 def frames(
-    image: Image, at: list[float], *, jobs: int = 2, **options: Any
+    image: Pictured, at: list[float], *, jobs: int = 2, **options: Any
 ) -> Iterator[NDArray[np.uint8]]:
     """Renders a picture at several times.
 
@@ -52,15 +57,16 @@ def frames(
     Yields:
         uint8 [H, W, 3 or 4], one for each time.
     """
+    cache = Cache()
 
-    def render(t: float) -> NDArray[np.uint8]:
-        return np.asarray(image.render(t=t, **options))
+    def frame(t: float) -> NDArray[np.uint8]:
+        return np.asarray(render(image, t=t, cache=cache, **options))
 
     with ThreadPoolExecutor(jobs) as pool:
         waiting: deque[Future[NDArray[np.uint8]]] = deque()
         try:
             for t in at:
-                waiting.append(pool.submit(render, t))
+                waiting.append(pool.submit(frame, t))
                 if len(waiting) > jobs:
                     yield waiting.popleft().result()
             while waiting:

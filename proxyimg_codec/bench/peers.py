@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import __version__
+from .._version import __version__
 from ..errors import UsageError
 
 Pixels = NDArray[np.uint8]
@@ -121,7 +121,7 @@ def pxi_encode(
     pixels: Pixels, quality: float, *, masks: Sequence[Any] | None = None, **options: Any
 ) -> bytes:
     """A .pxi file, on one thread; of one layer if there are no masks."""
-    from ..encoder.encode import encode
+    from ..api import encode
 
     if masks is None:
         options["max_layers"] = 1
@@ -131,7 +131,7 @@ def pxi_encode(
 
 def pxi_decode(data: bytes) -> Pixels:
     """The picture in a .pxi file."""
-    from ..image import from_bytes
+    from ..api import from_bytes
 
     return np.asarray(from_bytes(data).render())
 

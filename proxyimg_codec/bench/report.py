@@ -9,7 +9,7 @@ from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 
-from .. import __version__
+from .._version import __version__
 from ..io.files import write_atomically
 from . import summary
 from .peers import Codec

@@ -16,7 +16,7 @@ from .decode import key
 
 if TYPE_CHECKING:
     from ..animate.motion import Motion
-    from ..image import Image
+    from ..api import Image
 
 TARGETS = """OUT: .mp4, .webm, .webp, .gif or .apng; a folder/ or name-%04d.png for a file a frame;
 .png with --sheet for a sprite sheet and its .json; .pxi for a picture that carries the motion.
@@ -75,7 +75,7 @@ def animate_file(args: argparse.Namespace) -> None:
     clip = Path(args.output).suffix.lower() != ".pxi"
     check(args, clip)
 
-    from ..image import open_image
+    from ..api import open_image
 
     started = time.perf_counter()
     image = open_image(args.input, limits_of(args))
@@ -180,11 +180,12 @@ def spot(text: str) -> Any:
 def write_picture(image: Image, args: argparse.Namespace) -> str:
     """Writes the picture with its motion; says what that is."""
     from ..animate.animate import amplitude
+    from ..codec.write import to_bytes
     from ..io.files import write_atomically
 
     data = image.to_bytes()
     write_atomically(args.output, data)
-    extra = len(data) - len(replace(image, timeline=None).to_bytes())
+    extra = len(data) - len(to_bytes(replace(image.picture, timeline=None)))
     assert image.timeline is not None
     return (
         f"{len(data)} bytes, {extra} of them motion of {image.timeline.seconds:g} s, nodes "

@@ -96,7 +96,7 @@ def decode_file(args: argparse.Namespace) -> Sequence[str]:
         if rendering and os.path.realpath(output) == os.path.realpath(args.export_onnx):
             raise UsageError(f"{output}: the picture and the ONNX model need two files")
 
-    from ..image import open_image
+    from ..api import open_image
 
     started = time.perf_counter()
     image = open_image(args.input, limits_of(args), tolerant=args.tolerant)

@@ -9,12 +9,16 @@ import re
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import UsageError
 from .common import add_limits, check_target, limits_of, parser, printable, run
 from .decode import key
+
+if TYPE_CHECKING:
+    from ..model import Picture
 
 Values = dict[str, Any]
 
@@ -105,41 +109,43 @@ def edit_file(args: argparse.Namespace) -> None:
         check_target(args.output, args.force, None if same and args.force else args.input)
     operations = [_parsed(*edit) for edit in args.edits]
 
+    from ..codec.read import from_file
+    from ..codec.write import to_bytes
+    from ..edit.history import undone
     from ..edit.script import apply
-    from ..image import open_image
     from ..io.files import write_atomically
 
     started = time.perf_counter()
-    image, number = open_image(args.input, limits_of(args)), 1
+    picture, number = from_file(args.input, limits_of(args)), 1
     for values in operations:
         if "undo" in values:
-            image = image.undone(values["undo"])
+            picture = undone(picture, values["undo"])
             continue
         edits = values.get("script", [values])
-        image = apply(image, edits, number)
+        picture = apply(picture, edits, number)
         number += len(edits)
     if args.bake:
-        image = image.baked()
+        picture = replace(picture, history=())
     if args.list:
-        facts = listing(image)
+        facts = listing(picture)
         print(json.dumps(facts, indent=2) if args.json else text(facts))
     if args.output is None:
         return
-    data = image.to_bytes()
+    data = to_bytes(picture)
     write_atomically(args.output, data)
     report = {
         "output": args.output,
         "bytes": len(data),
-        "layers": [layer.name for layer in image.layers],
-        "edits": len(image.history),
+        "layers": [layer.name for layer in picture.layers],
+        "edits": len(picture.history),
         "seconds": round(time.perf_counter() - started, 3),
     }
     if args.json and not args.list:
         print(json.dumps(report))
     elif not args.quiet:
         print(
-            f"{args.output}: {len(data)} bytes, {len(image.layers)} layers, "
-            f"{len(image.history)} edits to undo, {report['seconds']:.2f} s",
+            f"{args.output}: {len(data)} bytes, {len(picture.layers)} layers, "
+            f"{len(picture.history)} edits to undo, {report['seconds']:.2f} s",
             file=sys.stderr,
         )
 
@@ -151,14 +157,14 @@ def _parsed(flag: str, parse: Callable[..., Values], words: list[str]) -> Values
         raise UsageError(f"{flag} {' '.join(words)}: cannot be understood; see --help") from None
 
 
-def listing(image: Any) -> dict[str, Any]:
+def listing(picture: Picture) -> dict[str, Any]:
     """Layers, groups and history, ready for JSON."""
     from ..edit.transforms import bounds
 
     layers = []
-    for i, layer in enumerate(image.layers):
+    for i, layer in enumerate(picture.layers):
         pose = layer.pose
-        x0, y0, x1, y1 = bounds([layer])
+        x0, y0, x1, y1 = bounds(picture, [layer])
         layers.append(
             {
                 "position": i,
@@ -177,8 +183,8 @@ def listing(image: Any) -> dict[str, Any]:
         )
     return {
         "layers": layers,
-        "groups": dict(image.groups),
-        "history": [_recorded(step.operation) for step in image.history],
+        "groups": dict(picture.groups),
+        "history": [_recorded(step.operation) for step in picture.history],
     }
 
 

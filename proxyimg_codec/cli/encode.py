@@ -89,9 +89,10 @@ def encode_file(args: argparse.Namespace) -> None:
     check_target(output, args.force, args.input)
     settings = settings_from(args)
 
-    from ..image import from_bytes
+    from ..codec.read import from_bytes
+    from ..codec.write import to_bytes
     from ..io.files import read_bytes, write_atomically
-    from ..io.psnr import psnr
+    from ..render.quality import psnr
 
     started, cpu = time.perf_counter(), time.process_time()
     source = read_bytes(args.input)
@@ -100,7 +101,7 @@ def encode_file(args: argparse.Namespace) -> None:
         image, original = encoded(source, args, settings, bar)
     finally:
         bar.close()
-    data = image.to_bytes()
+    data = to_bytes(image)
 
     # Of the file as it will be read, before it takes the place of an older one.
     quality = psnr(original, from_bytes(data))

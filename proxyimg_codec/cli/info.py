@@ -10,7 +10,8 @@ from typing import Any
 
 from ..container import texr
 from ..container.chunks import VERSION
-from ..container.file import Container, parse
+from ..container.content import Container
+from ..container.file import parse
 from ..io.files import read_bytes
 from .common import add_limits, limits_of, parser, printable, run
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import fields
 
-from ..container.file import Container, parse
-from ..image import Image
+from ..container.content import Container
+from ..container.file import parse_within
 from ..limits import DEFAULT_LIMITS, Budget, Limits
-from .pack import unpack
+from ..model import Picture
+from .unpack import unpack
 
 PROFILES = ("still", "posed", "moving")
 """Each has what those before it have, and: nothing; poses and node sampling; motion."""
@@ -36,18 +37,19 @@ COUNTED = tuple(f.name for f in fields(Limits) if f.name not in DRAWING)
 """Limits that make a level: all but those of what is drawn."""
 
 
-@dataclass(frozen=True)
 class Usage(Budget):
-    """A budget which remembers what was checked against them.
+    """A budget that remembers what was checked against its limits.
 
     Attributes:
         counted: The largest count of each limit, by its name.
     """
 
-    counted: dict[str, int] = field(default_factory=dict)
+    def __init__(self, limits: Limits) -> None:
+        super().__init__(limits)
+        self.counted: dict[str, int] = {}
 
     def check(self, name: str, value: int) -> None:
-        """As `Limits.check`."""
+        """As `Budget.check`."""
         super().check(name, value)
         self.counted[name] = max(self.counted.get(name, 0), value)
 
@@ -75,23 +77,23 @@ def profile_and_level(data: bytes, limits: Limits = DEFAULT_LIMITS) -> tuple[str
         UnsupportedError: It needs a newer reader.
         LimitError: It exceeds `limits`.
     """
-    usage = Usage(**asdict(limits))
-    content = parse(data, usage)
+    usage = Usage(limits)
+    content = parse_within(data, usage)
     refined(content, usage)
     return profile(content), usage.level
 
 
-def refined(c: Container, usage: Usage) -> Image:
+def refined(c: Container, usage: Usage) -> Picture:
     """The picture of a parsed file, with its meshes, so that all that makes its level is counted.
 
     Raises:
         FormatError, UnsupportedError, LimitError: As `profile_and_level`.
     """
-    image = unpack(c, usage)
-    for layer in image.layers:
+    picture = unpack(c, usage)
+    for layer in picture.layers:
         if layer.mesh is not None:
             _ = layer.mesh.refined
-    return image
+    return picture
 
 
 def profile(c: Container) -> str:

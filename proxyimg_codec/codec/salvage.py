@@ -13,12 +13,12 @@ import msgpack
 
 from ..container import file as container
 from ..container import head, layr, plan, texr, undo
-from ..container.chunks import Chunk, read_damaged, write
+from ..container.chunks import Chunk, read_damaged
+from ..container.content import Container
 from ..container.fields import pack
-from ..container.file import Container
 from ..errors import FormatError
 from ..geometry import boundary
-from ..limits import Limits
+from ..limits import Budget, Limits
 from ..texture import planes
 
 _END = Chunk("TAIL", b"")
@@ -41,8 +41,10 @@ def parse(data: bytes, limits: Limits) -> tuple[Container, tuple[str, ...]]:
         content = container.parse(data, limits)
     except FormatError as error:
         notes.append(str(error))
-        chunks, wrong = _usable(*read_damaged(data, limits), notes)
-        content = container.parse(write([*chunks, _END], chunks[0].version), limits)
+        chunks, wrong = _usable(*read_damaged(data, Budget(limits)), notes)
+        budget = Budget(limits)
+        budget.spend("file_bytes", len(data))
+        content = container.assemble([*chunks, _END], budget)
     sound = []
     for number, fields in enumerate(content.planes):
         read = planes.unpack(fields, f"chunk PLAN {number}")

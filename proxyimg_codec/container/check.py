@@ -3,28 +3,24 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 from ..errors import FormatError, UnsupportedError
-from ..limits import Limits
+from ..limits import Budget
 from . import mesh, pose, texr
-
-if TYPE_CHECKING:
-    from .file import Container, Values
+from .content import Container, Values
 
 
-def check(c: Container, limits: Limits) -> None:
+def check(c: Container, budget: Budget) -> None:
     """Checks a parsed file.
 
     Raises:
         FormatError: They contradict each other.
         UnsupportedError: They need a newer reader.
-        LimitError: They exceed `limits`.
+        LimitError: They exceed `budget`.
     """
-    limits = limits.budget()
     for name in ("layers", "networks"):
-        limits.check(name, c.head[name])
-    limits.check("side", max(c.head["size"]))
+        budget.check(name, c.head[name])
+    budget.check("side", max(c.head["size"]))
     counts = {"layers": len(c.layers), "networks": len(c.networks)}
     for name, count in counts.items():
         if count != c.head[name]:
@@ -41,15 +37,15 @@ def check(c: Container, limits: Limits) -> None:
         raise FormatError(
             "the number of areas is not that of the layers", "chunk iNFO", rule="CHK-17"
         )
-    limits.check("metadata_bytes", decompressed(c))
-    limits.spend("segments", sum(sum(layer["segments"]) for layer in c.layers))
-    limits.spend("gates", sum(values["gates"] for values in c.meshes))
+    budget.check("metadata_bytes", decompressed(c))
+    budget.spend("segments", sum(sum(layer["segments"]) for layer in c.layers))
+    budget.spend("gates", sum(values["gates"] for values in c.meshes))
     _check_layers(c)
     _check_tree(c)
-    _check_motion(c, limits)
-    _check_networks(c, limits)
-    _check_planes(c, limits)
-    _check_textures(c, limits)
+    _check_motion(c, budget)
+    _check_networks(c, budget)
+    _check_planes(c, budget)
+    _check_textures(c, budget)
 
 
 def decompressed(c: Container) -> int:
@@ -57,7 +53,7 @@ def decompressed(c: Container) -> int:
     return sum(map(len, c.blocks.values())) + (c.motion["size"] if c.motion else 0)
 
 
-def _check_motion(c: Container, limits: Limits) -> None:
+def _check_motion(c: Container, budget: Budget) -> None:
     """Checks mOTN."""
     if c.motion is None:
         return
@@ -79,26 +75,26 @@ def _check_motion(c: Container, limits: Limits) -> None:
         raise FormatError("the script and its size do not fit", "chunk mOTN", rule="MOT-1")
     # It is spent once the meshes are decoded, with what nodes cost.
     coefficients = len(numbers) * (c.motion["intervals"] + (0 if c.motion["loop"] else 3))
-    limits.check("wavefronts", coefficients + 2)
-    limits.check("motion", c.motion["modes"] * coefficients)
+    budget.check("wavefronts", coefficients + 2)
+    budget.check("motion", c.motion["modes"] * coefficients)
 
 
-def _check_networks(c: Container, limits: Limits) -> None:
+def _check_networks(c: Container, budget: Budget) -> None:
     for net in c.networks:
         if net["channels"] > c.head["channels"]:
             raise FormatError("more channels than HEAD has", "chunk NETW", rule="CHK-12")
         width = net["hidden"]
         encoded = net["dim"] * (2 * net["octaves"] + 1)
         parameters = (encoded + 1) * width + (net["depth"] - 1) * (width + 1) * width
-        limits.spend("parameters", parameters + (width + 1) * net["channels"])
+        budget.spend("parameters", parameters + (width + 1) * net["channels"])
 
 
-def _check_planes(c: Container, limits: Limits) -> None:
+def _check_planes(c: Container, budget: Budget) -> None:
     """Checks PLAN, and that textures use all of them, in their order."""
     for planes in c.planes:
         columns, rows = (-(-n >> planes["levels"]) << planes["levels"] for n in planes["size"])
-        limits.spend("wavefronts", columns + 3 * rows)
-        limits.spend("samples", columns * rows)
+        budget.spend("wavefronts", columns + 3 * rows)
+        budget.spend("samples", columns * rows)
     used = 0
     for texture in c.textures:
         if texture["coder"] != texr.PYRAMID:
@@ -115,7 +111,7 @@ def _check_planes(c: Container, limits: Limits) -> None:
         raise FormatError(f"planes {used} are not used", "chunk PLAN", rule="PYR-3")
 
 
-def _check_textures(c: Container, limits: Limits) -> None:
+def _check_textures(c: Container, budget: Budget) -> None:
     for i, (layer, own) in enumerate(zip(c.layers, c.textures, strict=True)):
         if min(layer["box"][2:]) < 1:
             raise FormatError("the box is empty", "chunk LAYR", rule="CHK-6")
@@ -143,15 +139,15 @@ def _check_textures(c: Container, limits: Limits) -> None:
             _check_cuts(c, i)
             area = own["part"][2] * own["part"][3]
             if own["mask"] or own["cuts"]:
-                limits.spend("filled", area)
+                budget.spend("filled", area)
             # A layer that cuts itself may also lose what those behind it touch.
-            limits.spend("covered", area * (len(own["cuts"]) + (i if i in own["cuts"] else 0)))
+            budget.spend("covered", area * (len(own["cuts"]) + (i if i in own["cuts"] else 0)))
             if not own["mask"]:
                 continue
         rows, columns = texr.mask_shape(own) if pyramid else own["grid"][::-1]
-        limits.spend("wavefronts", columns + 2 * rows)
+        budget.spend("wavefronts", columns + 2 * rows)
         dim = 1 if pyramid else c.networks[own["network"]]["dim"]
-        limits.spend("codes", columns * rows * dim)
+        budget.spend("codes", columns * rows * dim)
 
 
 def _check_implicit(c: Container, layer: Values, texture: Values) -> int:

@@ -14,7 +14,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ..errors import FormatError, UnsupportedError
-from ..limits import DEFAULT_LIMITS, Limits
+from ..limits import Budget
 
 SIGNATURE = b"\x89PXI\r\n\x1a\n"
 VERSION = (0, 9)
@@ -103,7 +103,7 @@ def _valid_type(raw: bytes) -> bool:
     return raw.isalpha() and raw[2:3].isupper()
 
 
-def read(data: bytes, limits: Limits = DEFAULT_LIMITS) -> list[Chunk]:
+def read(data: bytes, budget: Budget | None = None) -> list[Chunk]:
     """All chunks of a file, in order, each CRC checked.
 
     Raises:
@@ -111,14 +111,15 @@ def read(data: bytes, limits: Limits = DEFAULT_LIMITS) -> list[Chunk]:
         UnsupportedError: Another format version.
         LimitError: Too large or too many chunks.
     """
-    limits.spend("file_bytes", len(data))
+    budget = budget or Budget()
+    budget.spend("file_bytes", len(data))
     version = _version(data)
     chunks: list[Chunk] = []
     at = PREFIX.size
     while at < len(data):
         if chunks and chunks[-1].type == "TAIL":
             raise FormatError("bytes follow the last chunk", offset=at, rule="CON-13")
-        limits.check("chunks", len(chunks) + 1)
+        budget.check("chunks", len(chunks) + 1)
         if len(data) - at < FRAME.size + 4:
             raise FormatError("truncated in a chunk header", offset=at, rule="CON-7")
         raw, length = FRAME.unpack_from(data, at)
@@ -141,9 +142,7 @@ def read(data: bytes, limits: Limits = DEFAULT_LIMITS) -> list[Chunk]:
     return chunks
 
 
-def read_damaged(
-    data: bytes, limits: Limits = DEFAULT_LIMITS
-) -> tuple[list[Chunk], dict[int, bool]]:
+def read_damaged(data: bytes, budget: Budget | None = None) -> tuple[list[Chunk], dict[int, bool]]:
     """The chunks of a file that may be cut off or damaged, as far as chunks can be told.
 
     Returns:
@@ -155,13 +154,14 @@ def read_damaged(
         UnsupportedError: Another format version.
         LimitError: Too large or too many chunks.
     """
-    limits.spend("file_bytes", len(data))
+    budget = budget or Budget()
+    budget.spend("file_bytes", len(data))
     version = _version(data)
     chunks: list[Chunk] = []
     wrong: dict[int, bool] = {}
     at = PREFIX.size
     while len(data) - at >= FRAME.size and not (chunks and chunks[-1].type == "TAIL"):
-        limits.check("chunks", len(chunks) + 1)
+        budget.check("chunks", len(chunks) + 1)
         raw, length = FRAME.unpack_from(data, at)
         if not _valid_type(raw):
             break

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
 
 from ..errors import FormatError, UnsupportedError
-from ..limits import DEFAULT_LIMITS, Limits
+from ..limits import DEFAULT_LIMITS, Budget, Limits
 from . import check, head, layr, mesh, meta, motn, netw, plan, pose, texr, tree, undo
 from .chunks import Chunk, read, write
+from .content import Container, Values
 from .fields import Field, pack, unpack
-
-Values = Mapping[str, Any]
 
 _STRUCTURE = (layr.TYPE, mesh.TYPE, pose.TYPE, netw.TYPE, plan.TYPE, texr.TYPE)
 _SINGLE = (meta.INFO_TYPE, tree.TYPE, motn.TYPE, undo.TYPE)
@@ -25,48 +22,6 @@ _FIELDS = {
 }
 
 
-@dataclass(frozen=True)
-class Container:
-    """A parsed file: the checked values of its chunks by key, in file order.
-
-    Attributes:
-        head: Fields of HEAD.
-        layers: Fields of each LAYR, back to front.
-        networks: Fields of each NETW.
-        textures: Fields of each TEXR, one a layer.
-        planes: Fields of each PLAN.
-        meshes: Fields of each MESH.
-        poses: Fields of each POSE.
-        tree: Fields of tREE, or None.
-        motion: Fields of mOTN, or None.
-        history: Steps of uNDO that led to this state.
-        blocks: Metadata blocks by name: ``icc``, ``exif``, ``xmp``.
-        info: Fields of iNFO, or None.
-        extra: Unknown ancillary chunks.
-        sizes: Bytes of all chunks of a type, framing included, by type.
-    """
-
-    head: Values
-    layers: tuple[Values, ...]
-    networks: tuple[Values, ...]
-    textures: tuple[Values, ...]
-    planes: tuple[Values, ...] = ()
-    meshes: tuple[Values, ...] = ()
-    poses: tuple[Values, ...] = ()
-    tree: Values | None = None
-    motion: Values | None = None
-    history: tuple[undo.Step, ...] = ()
-    blocks: Mapping[str, bytes] = field(default_factory=dict)
-    info: Values | None = None
-    extra: tuple[Chunk, ...] = ()
-    sizes: Mapping[str, int] = field(default_factory=dict)
-
-    def texture_of(self, layer: int) -> Values:
-        """Fields of the texture that a layer shows: its own, or the one it shares."""
-        own = self.textures[layer]
-        return self.textures[own["texture"]] if own["coder"] == texr.SHARED else own
-
-
 def parse(data: bytes, limits: Limits = DEFAULT_LIMITS) -> Container:
     """Reads and checks a whole file, short of decoding its entropy-coded streams.
 
@@ -75,60 +30,86 @@ def parse(data: bytes, limits: Limits = DEFAULT_LIMITS) -> Container:
         UnsupportedError: It needs a newer reader.
         LimitError: It exceeds `limits`.
     """
-    limits = limits.budget()
-    return assemble(read(data, limits), limits)
+    return parse_within(data, Budget(limits))
+
+
+def parse_within(data: bytes, budget: Budget) -> Container:
+    """As `parse`, of a budget that decoding goes on to spend.
+
+    Raises:
+        FormatError, UnsupportedError, LimitError: As `parse`.
+    """
+    return assemble(read(data, budget), budget)
 
 
 def assemble(
-    chunks: Sequence[Chunk], limits: Limits, values_of: Callable[[Chunk], Values] | None = None
+    chunks: Sequence[Chunk], budget: Budget, values_of: Callable[[Chunk], Values] | None = None
 ) -> Container:
     """The container of all chunks of a file.
 
     Args:
         chunks: The last is TAIL.
-        limits: Bounds them all together.
+        budget: Bounds them all together.
         values_of: Gives the values of a structured chunk; `values` by default.
 
     Raises:
         FormatError, UnsupportedError, LimitError: As `parse`.
     """
-    values_of, limits = values_of or values, limits.budget()
-    if chunks[0].type != head.TYPE:
+    first, last = chunks[0], chunks[-1]
+    if first.type != head.TYPE:
         raise FormatError(
-            "the first chunk is not HEAD",
-            f"chunk {chunks[0].type}",
-            chunks[0].offset,
-            rule="CON-11",
+            "the first chunk is not HEAD", f"chunk {first.type}", first.offset, rule="CON-11"
         )
-    header = values_of(chunks[0])
-    parts: dict[str, list[Values]] = {t: [] for t in _STRUCTURE}
-    blocks: dict[str, bytes] = {}
-    single: dict[str, Values] = {}
-    history: tuple[undo.Step, ...] = ()
-    extra: list[Chunk] = []
-    stage = 0
-    sizes: dict[str, int] = {}
-    for chunk in chunks:
-        sizes[chunk.type] = sizes.get(chunk.type, 0) + chunk.size
+    parts = _Parts(chunks, budget, values_of or values)
     for chunk in chunks[1:-1]:
+        parts.add(chunk)
+    if last.payload:
+        raise FormatError("must be empty", "chunk TAIL", last.offset, rule="CON-11")
+    container = parts.container()
+    check.check(container, budget)
+    return container
+
+
+class _Parts:
+    """The chunks of a file sorted by what they are, in the order in which they come."""
+
+    def __init__(
+        self, chunks: Sequence[Chunk], budget: Budget, values_of: Callable[[Chunk], Values]
+    ) -> None:
+        self._chunks, self._budget, self._values_of = chunks, budget, values_of
+        self._header = values_of(chunks[0])
+        self._structure: dict[str, list[Values]] = {t: [] for t in _STRUCTURE}
+        self._blocks: dict[str, bytes] = {}
+        self._single: dict[str, Values] = {}
+        self._history: tuple[undo.Step, ...] = ()
+        self._extra: list[Chunk] = []
+        self._stage = 0
+
+    def add(self, chunk: Chunk) -> None:
+        """Takes the next chunk after HEAD.
+
+        Raises:
+            FormatError: It may not stand here, or is wrong in itself.
+            UnsupportedError: It is critical and not known.
+            LimitError: It exceeds the budget.
+        """
         where = f"chunk {chunk.type}"
         if chunk.type in _STRUCTURE:
-            if _STRUCTURE.index(chunk.type) < stage or blocks or single:
-                raise FormatError("out of order", where, chunk.offset, rule="CON-11")
             stage = _STRUCTURE.index(chunk.type)
-            parts[chunk.type].append(values_of(chunk))
+            if stage < self._stage or self._blocks or self._single:
+                raise FormatError("out of order", where, chunk.offset, rule="CON-11")
+            self._stage = stage
+            self._structure[chunk.type].append(self._values_of(chunk))
         elif chunk.type in _BLOCK_NAMES:
-            name = _BLOCK_NAMES[chunk.type]
-            if name in blocks:
-                raise FormatError("appears twice", where, chunk.offset, rule="CON-11")
-            blocks[name] = meta.decompress(chunk, where, limits)
+            self._once(chunk, self._blocks, _BLOCK_NAMES[chunk.type])
+            block = meta.decompress(chunk, where, self._budget)
+            self._blocks[_BLOCK_NAMES[chunk.type]] = block
         elif chunk.type in _SINGLE:
-            if chunk.type in single:
-                raise FormatError("appears twice", where, chunk.offset, rule="CON-11")
-            single[chunk.type] = values_of(chunk)
+            self._once(chunk, self._single, chunk.type)
+            self._single[chunk.type] = self._values_of(chunk)
             if chunk.type == undo.TYPE:
-                present = [c for c in chunks if c.type not in (undo.TYPE, "TAIL")]
-                history = _renewed(undo.decode(chunk, present, where, limits))
+                present = [c for c in self._chunks if c.type not in (undo.TYPE, "TAIL")]
+                self._history = _renewed(undo.decode(chunk, present, where, self._budget))
         elif chunk.type in (head.TYPE, "TAIL"):
             raise FormatError("appears twice", where, chunk.offset, rule="CON-11")
         elif chunk.critical:
@@ -136,17 +117,35 @@ def assemble(
                 f"{where} is not known to this program; update proxyimg-codec", rule="CON-9"
             )
         else:
-            extra.append(chunk)
-    if chunks[-1].payload:
-        raise FormatError("must be empty", "chunk TAIL", chunks[-1].offset, rule="CON-11")
-    container = Container(
-        header, tuple(parts[layr.TYPE]), tuple(parts[netw.TYPE]), tuple(parts[texr.TYPE]),
-        tuple(parts[plan.TYPE]), tuple(parts[mesh.TYPE]), tuple(parts[pose.TYPE]),
-        single.get(tree.TYPE), single.get(motn.TYPE), history, blocks,
-        single.get(meta.INFO_TYPE), tuple(extra), sizes,
-    )  # fmt: skip
-    check.check(container, limits)
-    return container
+            self._extra.append(chunk)
+
+    @staticmethod
+    def _once(chunk: Chunk, seen: Mapping[str, object], name: str) -> None:
+        if name in seen:
+            raise FormatError("appears twice", f"chunk {chunk.type}", chunk.offset, rule="CON-11")
+
+    def container(self) -> Container:
+        """All that was taken."""
+        sizes: dict[str, int] = {}
+        for chunk in self._chunks:
+            sizes[chunk.type] = sizes.get(chunk.type, 0) + chunk.size
+        structure, single = self._structure, self._single
+        return Container(
+            head=self._header,
+            layers=tuple(structure[layr.TYPE]),
+            networks=tuple(structure[netw.TYPE]),
+            textures=tuple(structure[texr.TYPE]),
+            planes=tuple(structure[plan.TYPE]),
+            meshes=tuple(structure[mesh.TYPE]),
+            poses=tuple(structure[pose.TYPE]),
+            tree=single.get(tree.TYPE),
+            motion=single.get(motn.TYPE),
+            history=self._history,
+            blocks=self._blocks,
+            info=single.get(meta.INFO_TYPE),
+            extra=tuple(self._extra),
+            sizes=sizes,
+        )
 
 
 def fields_of(chunk: Chunk) -> tuple[Field, ...]:

@@ -3,7 +3,7 @@
 import zstandard
 
 from ..errors import FormatError, LimitError
-from ..limits import Limits
+from ..limits import Budget
 from .chunks import Chunk
 from .fields import Field, pack, unpack
 
@@ -41,21 +41,21 @@ def compressed(block: bytes) -> bytes:
     return frame
 
 
-def decompress(chunk: Chunk, where: str, limits: Limits) -> bytes:
-    """The block of a metadata chunk, never larger than `limits.metadata_bytes`.
+def decompress(chunk: Chunk, where: str, budget: Budget) -> bytes:
+    """The block of a metadata chunk, never larger than the limit `metadata_bytes`.
 
     Raises:
         FormatError: Not a zstd frame of the stated size.
         LimitError: Larger than the limit.
     """
     values = unpack(FIELDS, chunk.payload, where, old=chunk.old)
-    return decompressed(values["size"], values["zstd"], where, limits)
+    return decompressed(values["size"], values["zstd"], where, budget)
 
 
 def decompressed(
-    size: int, frame: bytes, where: str, limits: Limits, rule: str = "CHK-16"
+    size: int, frame: bytes, where: str, budget: Budget, rule: str = "CHK-16"
 ) -> bytes:
-    """The block of `size` bytes that `frame` holds, never larger than `limits.metadata_bytes`.
+    """The block of `size` bytes that `frame` holds, never larger than the limit `metadata_bytes`.
 
     `rule` is the one that asks for it.
 
@@ -63,7 +63,7 @@ def decompressed(
         FormatError: Not a zstd frame of that size.
         LimitError: Larger than the limit.
     """
-    limits.spend("metadata_bytes", size)
+    budget.spend("metadata_bytes", size)
     _check_window(frame, where)
     try:
         decompressor = zstandard.ZstdDecompressor(max_window_size=WINDOW_MAX)

@@ -13,7 +13,7 @@ from typing import Any
 import msgpack
 
 from ..errors import FormatError, LimitError
-from ..limits import DEFAULT_LIMITS, Limits
+from ..limits import DEFAULT_LIMITS, Budget
 from . import meta
 from .chunks import PREFIX, SIGNATURE, Chunk, write
 from .fields import Few, Field, pack, unpack
@@ -81,21 +81,21 @@ def encode(present: Sequence[Chunk], steps: Sequence[Step], beside: int = 0) -> 
     return Chunk(TYPE, pack(FIELDS, values))
 
 
-def decode(own: Chunk, present: Sequence[Chunk], where: str, limits: Limits) -> tuple[Step, ...]:
+def decode(own: Chunk, present: Sequence[Chunk], where: str, budget: Budget) -> tuple[Step, ...]:
     """Inverse of `encode`; nothing if the history belongs to another state.
 
     Raises:
         FormatError: The history is corrupt.
-        LimitError: It exceeds `limits`.
+        LimitError: It exceeds `budget`.
     """
     values = unpack(FIELDS, own.payload, where, old=own.old)
     if values["state"] != digest(present, own.old):
         return ()
-    history = meta.decompressed(values["size"], values["zstd"], where, limits, "CHK-20")
+    history = meta.decompressed(values["size"], values["zstd"], where, budget, "CHK-20")
     try:
-        arrays = 3 + limits.chunks + 2 * STEPS_MAX
+        arrays = 3 + budget.limits.chunks + 2 * STEPS_MAX
         refusal = LimitError("the history holds too many arrays or items", rule="SEC-2")
-        few = Few(arrays, limits.references + 3 * arrays, refusal)
+        few = Few(arrays, budget.limits.references + 3 * arrays, refusal)
         content = msgpack.unpackb(
             history, raw=False, strict_map_key=True, max_ext_len=0, max_map_len=2,
             max_array_len=1 << 20, list_hook=few, object_hook=few,
@@ -104,8 +104,8 @@ def decode(own: Chunk, present: Sequence[Chunk], where: str, limits: Limits) -> 
         kept, steps = dict.values(content) if own.old else content
         if keys != ["chunks", "steps"][: len(keys)] or len(steps) > STEPS_MAX:
             raise ValueError
-        limits.check("chunks", len(present) + len(kept))
-        limits.check("references", sum(len(references) for _, references in steps))
+        budget.check("chunks", len(present) + len(kept))
+        budget.check("references", sum(len(references) for _, references in steps))
         pool = [*present, *(_chunk(type_, payload, own.version) for type_, payload in kept)]
         result = tuple(_step(operation, references, pool) for operation, references in steps)
         if msgpack.packb(content, use_bin_type=True) != history:

@@ -10,15 +10,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..codec.read import from_file
 from ..errors import InputError, PxiError, UsageError
 from ..geometry.boundary import Boundary
 from ..geometry.mesh import FRACTION_BITS
 from ..geometry.pose import COLOUR_BITS, COLOUR_MAX, NODE_BITS, NODE_MAX, OPACITY_MAX
 from ..geometry.warp import WEIGHT_BITS, barycentric
-from ..image import Image, Layer, open_image
+from ..model import Layer, Picture
 from ..texture.network import Network
 from ..texture.pyramid import PyramidTexture, Texture
-from .operations import changed, one, operation, shown_together, substituted
+from .operations import changed, layer_named, operation, shown_together, substituted
 from .transforms import TARGET, meshed, sampled
 
 LUMA = (0.2126, 0.7152, 0.0722)
@@ -28,34 +29,34 @@ Reals = NDArray[np.float64]
 
 
 @operation("opacity", layer=TARGET, value="number: 0 to 1")
-def opacity(image: Image, layer: str | int, value: float) -> Image:
+def opacity(picture: Picture, layer: str | int, value: float) -> Picture:
     """Sets the opacity of a layer."""
     if not 0 <= value <= 1:
         raise UsageError(f"opacity: {value} is not within 0 and 1")
-    return _posed(image, layer, opacity=round(value * OPACITY_MAX))
+    return _posed(picture, layer, opacity=round(value * OPACITY_MAX))
 
 
 @operation("hide", layer=TARGET)
-def hide(image: Image, layer: str | int) -> Image:
+def hide(picture: Picture, layer: str | int) -> Picture:
     """Stops drawing a layer."""
-    return _posed(image, layer, hidden=True)
+    return _posed(picture, layer, hidden=True)
 
 
 @operation("show", layer=TARGET)
-def show(image: Image, layer: str | int) -> Image:
+def show(picture: Picture, layer: str | int) -> Picture:
     """Draws a hidden layer again."""
-    return _posed(image, layer, hidden=False)
+    return _posed(picture, layer, hidden=False)
 
 
 @operation("still", layer=TARGET)
-def still(image: Image, layer: str | int) -> Image:
+def still(picture: Picture, layer: str | int) -> Picture:
     """Forgets the motion of a layer."""
-    return substituted(image, [replace(v, track=None) for v in shown_together(image, layer)])
+    return substituted(picture, [replace(v, track=None) for v in shown_together(picture, layer)])
 
 
-def _posed(image: Image, target: str | int, **values: Any) -> Image:
-    layers = shown_together(image, target)
-    return substituted(image, [replace(v, pose=replace(v.pose, **values)) for v in layers])
+def _posed(picture: Picture, target: str | int, **values: Any) -> Picture:
+    layers = shown_together(picture, target)
+    return substituted(picture, [replace(v, pose=replace(v.pose, **values)) for v in layers])
 
 
 @operation("recolour", layer=TARGET, hue="number?: degrees to turn the hue by",
@@ -63,14 +64,14 @@ def _posed(image: Image, target: str | int, **values: Any) -> Image:
            tint="colour?: #rrggbb, whose shades are used",
            matrix="colours?: rows of a 3 x 4 matrix for red, green, blue and one")  # fmt: skip
 def recolour(
-    image: Image,
+    picture: Picture,
     layer: str | int,
     hue: float = 0,
     saturation: float = 1,
     brightness: float = 1,
     tint: str | None = None,
     matrix: Sequence[float] | None = None,
-) -> Image:
+) -> Picture:
     """Changes the colours of a layer, in the order of the parameters, on top of earlier changes."""
     change = np.eye(4)
     steps = [_hue(hue), _saturation(saturation), np.eye(3) * brightness]
@@ -82,7 +83,7 @@ def recolour(
     if matrix is not None:
         change[:3] = np.array(matrix, float).reshape(3, 4) @ change
     layers = []
-    for each in shown_together(image, layer):
+    for each in shown_together(picture, layer):
         before = np.eye(4)
         if each.pose.colour:
             before[:3] = np.array(each.pose.colour).reshape(3, 4) / (1 << COLOUR_BITS)
@@ -92,7 +93,7 @@ def recolour(
         rest = np.array_equal(values, np.eye(4)[:3] * (1 << COLOUR_BITS))
         colour = () if rest else tuple(int(v) for v in values.ravel())
         layers.append(replace(each, pose=replace(each.pose, colour=colour)))
-    return substituted(image, layers)
+    return substituted(picture, layers)
 
 
 def _saturation(factor: float) -> Reals:
@@ -114,55 +115,56 @@ def _hue(degrees: float) -> Reals:
            from_layer="layer?: a layer of that .pxi file; its front one by default",
            fit="fit?: box to box, or by the shape of the outlines")  # fmt: skip
 def texture(
-    image: Image,
+    picture: Picture,
     layer: str | int,
     source: str,
     from_layer: str | int | None = None,
     fit: str = "box",
-) -> Image:
+) -> Picture:
     """Gives a layer the texture of another layer, of another file's layer, or of a picture."""
-    target = one(image, layer)
-    networks = list(image.networks)
-    if source in {v.name for v in image.layers}:
+    target = layer_named(picture, layer)
+    networks = list(picture.networks)
+    if source in {v.name for v in picture.layers}:
         if from_layer is not None:
             raise UsageError("texture: from_layer needs a .pxi file as source")
-        origin = one(image, source)
+        home, origin = picture, layer_named(picture, source)
         shown = origin.texture
     else:
-        origin = _loaded(source, from_layer)
-        shown = _brought(image, origin, networks)
+        home, origin = _loaded(source, from_layer)
+        shown = _brought(picture, home, origin, networks)
     if origin.sampling and fit == "shape":
         raise UsageError(
             f"texture: layer {origin.name!r} has its features at its own nodes, which do not fit "
             "the outline of another layer; stretch it box to box"
         )
     if origin.sampling and target.mesh is None:
-        target = meshed(target)
+        target = meshed(picture, target)
     new = replace(target, texture=shown, sampling=origin.sampling)
     if fit == "shape" or origin.pose.places is not None:
-        new = _placed(new, origin, fit)
+        matched = (target, picture.size, origin, home.size) if fit == "shape" else None
+        new = _placed(meshed(picture, new), origin, matched)
     else:
         new = replace(new, pose=replace(new.pose, places=None))
-    layers = [new if v.name == target.name else v for v in image.layers]
-    return changed(image, layers, networks=networks)
+    layers = [new if v.name == target.name else v for v in picture.layers]
+    return changed(picture, layers, networks=networks)
 
 
-def _brought(image: Image, origin: Layer, networks: list[Network]) -> Texture:
-    """The texture of another image's layer as one of `image`, whose `networks` may grow.
+def _brought(picture: Picture, home: Picture, origin: Layer, networks: list[Network]) -> Texture:
+    """The texture of layer `origin` of picture `home` as one of `picture`.
 
     Planes come as a whole, with what other layers of their file show of them. A network or planes
-    that the image has already are taken from there.
+    that the picture has already are taken from there; `networks` may grow.
     """
     texture = origin.texture
     if isinstance(texture, PyramidTexture):
-        views = (v.texture for v in image.layers if isinstance(v.texture, PyramidTexture))
+        views = (v.texture for v in picture.layers if isinstance(v.texture, PyramidTexture))
         known = [p for view in views for p in view.sources]
         own, *alpha = (
             next((p for p in known if p.packed == source.packed), source)
             for source in texture.sources
         )
         return replace(texture, planes=own, alpha=alpha[0] if alpha else None)
-    brought = origin.network
+    brought = home.network_of(origin)
     assert brought is not None
     same = (i for i, v in enumerate(networks) if v.packed == brought.packed)
     number = next(same, len(networks))
@@ -171,8 +173,8 @@ def _brought(image: Image, origin: Layer, networks: list[Network]) -> Texture:
     return replace(texture, network=number)
 
 
-def _loaded(source: str, name: str | int | None) -> Layer:
-    """The layer of a `.pxi` file, or a picture file as one layer.
+def _loaded(source: str, name: str | int | None) -> tuple[Picture, Layer]:
+    """A `.pxi` file and a layer of it, or a picture file encoded as one layer.
 
     Raises:
         UsageError: There is no such file.
@@ -188,8 +190,8 @@ def _loaded(source: str, name: str | int | None) -> Layer:
     except OSError as error:
         raise InputError(f"{source}: cannot be read: {error.strerror}") from None
     if known:
-        layers = open_image(source).layers
-        return layers[-1 if name is None else name]  # type: ignore[no-any-return]  # untyped key
+        found = from_file(source)
+        return found, found.layers[-1 if name is None else name]
     if name is not None:
         raise UsageError(f"texture: {source} is not a .pxi file, which from_layer needs")
     from ..io.raster import read
@@ -201,19 +203,24 @@ def _loaded(source: str, name: str | int | None) -> Layer:
         raise PxiError(
             f"the texture of a picture needs {error.name}: pip install 'proxyimg-codec[encode]'"
         ) from None
-    return encode(pixels, max_layers=1).layers[0]  # type: ignore[no-any-return]  # untyped key
+    made = encode(pixels, max_layers=1)
+    return made, made.layers[0]
 
 
-def _placed(layer: Layer, origin: Layer, fit: str) -> Layer:
-    """`layer`, whose texture is that of `origin`, with nodes that show what `origin` shows."""
-    layer = meshed(layer)
+Shapes = tuple[Layer, tuple[int, int], Layer, tuple[int, int]]
+"""A layer and the size of its canvas, and another one whose shape is mapped to its shape."""
+
+
+def _placed(layer: Layer, origin: Layer, matched: Shapes | None) -> Layer:
+    """A meshed layer, whose texture is that of `origin`, with nodes that show what that shows.
+
+    `matched` says whose outlines meet; None stretches box to box.
+    """
     assert layer.mesh is not None
     rest = layer.mesh.refined.nodes / (1 << FRACTION_BITS)
     here, there = (np.array(v.box, float).reshape(2, 2) for v in (layer, origin))
     scale = here[1] / there[1]
-    points = (
-        _matched(rest, layer, origin) if fit == "shape" else there[0] + (rest - here[0]) / scale
-    )
+    points = there[0] + (rest - here[0]) / scale if matched is None else _matched(rest, matched)
     if origin.pose.places is not None:
         assert origin.mesh is not None
         refined = origin.mesh.refined
@@ -228,16 +235,14 @@ def _placed(layer: Layer, origin: Layer, fit: str) -> Layer:
     return replace(layer, pose=replace(layer.pose, places=places if places.any() else None))
 
 
-def _matched(points: Reals, layer: Layer, origin: Layer) -> Reals:
+def _matched(points: Reals, shapes: Shapes) -> Reals:
     """Points [N, 2] of a layer in the shape of another, so that outlines meet.
 
     Polar: a point at direction t from the centre of its shape, at a share r of the way to the
-    outline, becomes the point at direction t and share r in the shape of `origin`.
+    outline, becomes the point at direction t and share r in the other shape.
     """
-    assert layer.image is not None
-    assert origin.image is not None
-    here = _Star(layer.boundary, (layer.image.width, layer.image.height))
-    there = _Star(origin.boundary, (origin.image.width, origin.image.height))
+    layer, size, origin, origin_size = shapes
+    here, there = _Star(layer.boundary, size), _Star(origin.boundary, origin_size)
     away = points - here.centre
     angle = np.arctan2(away[:, 1], away[:, 0])
     ratio = there.reach(angle) / here.reach(angle)

@@ -1,6 +1,6 @@
 """The registry of edit operations, and what all of them share.
 
-An operation is data: a JSON object with the key ``op`` and parameters. Its function takes an image
+An operation is data: a JSON object with the key ``op`` and parameters. Its function takes a picture
 and returns another; the original is never changed.
 """
 
@@ -15,10 +15,12 @@ from typing import Any
 
 import numpy as np
 
+from ..codec.write import state
 from ..container.undo import Step
 from ..errors import UsageError
 from ..geometry.pose import OPACITY_MAX
-from ..image import Image, Layer, Layers
+from ..model import Layer, Layers, Picture
+from ..render.neighbours import settled
 from ..texture.network import Network
 
 NAME_MAX = 200
@@ -72,7 +74,7 @@ class Parameter:
 class Operation:
     """One operation: its function, parameters and a sentence."""
 
-    apply: Callable[..., Image]
+    apply: Callable[..., Picture]
     parameters: Mapping[str, Parameter]
     meaning: str
 
@@ -80,7 +82,7 @@ class Operation:
 OPERATIONS: dict[str, Operation] = {}
 
 
-def operation(name: str, /, **parameters: str) -> Callable[[Callable[..., Image]], Any]:
+def operation(name: str, /, **parameters: str) -> Callable[[Callable[..., Picture]], Any]:
     """Registers a function as operation `name`.
 
     Each parameter is described by ``kind: sentence``; a kind that ends in ``?`` may be left out.
@@ -90,15 +92,15 @@ def operation(name: str, /, **parameters: str) -> Callable[[Callable[..., Image]
         kind, _, meaning = text.partition(": ")
         known[key] = Parameter(kind.rstrip("?"), not kind.endswith("?"), meaning)
 
-    def register(function: Callable[..., Image]) -> Callable[..., Image]:
+    def register(function: Callable[..., Picture]) -> Callable[..., Picture]:
         OPERATIONS[name] = Operation(function, known, (function.__doc__ or "").splitlines()[0])
         return function
 
     return register
 
 
-def run(image: Image, values: Mapping[str, Any]) -> Image:
-    """The image after one operation, which its history then tells.
+def run(picture: Picture, values: Mapping[str, Any]) -> Picture:
+    """The picture after one operation, which its history then tells.
 
     Raises:
         UsageError: The operation is unknown, has wrong parameters, or cannot be done.
@@ -119,11 +121,11 @@ def run(image: Image, values: Mapping[str, Any]) -> Image:
             raise UsageError(f"{name}: {key} is {shown}; it must be {parameter.meaning}")
         if key not in given and parameter.needed:
             raise UsageError(f"{name}: {key} is missing; it must be {parameter.meaning}")
-    result = chosen.apply(image, **given)
+    result = chosen.apply(picture, **given)
     text = json.dumps({"op": name, **given}, ensure_ascii=False)
     # Names of files may hold what UTF-8 cannot; written like this it is JSON again.
-    step = Step(text.encode(errors="backslashreplace").decode(), image.chunks)
-    return replace(result, history=(*image.history, step))
+    step = Step(text.encode(errors="backslashreplace").decode(), state(picture))
+    return replace(result, history=(*picture.history, step))
 
 
 def _plain(value: Any) -> Any:
@@ -151,85 +153,88 @@ def _fits(value: Any, schema: Mapping[str, Any]) -> bool:
     return False
 
 
-def one(image: Image, name: str | int) -> Layer:
+def layer_named(picture: Picture, name: str | int) -> Layer:
     """The layer with a name or at a position.
 
     Raises:
         UsageError: There is none, or it is a group.
     """
-    if isinstance(name, str) and name in image.groups:
+    if isinstance(name, str) and name in picture.groups:
         raise UsageError(f"{name!r} is a group; this works on single layers")
-    layer: Layer = image.layers[name]
-    return layer
+    return picture.layers[name]
 
 
-def members(image: Image, name: str | int) -> list[Layer]:
+def members(picture: Picture, name: str | int) -> list[Layer]:
     """The layers of a group, or a layer, and all that follow it, back to front.
 
     Raises:
         UsageError: There is no such layer or group, or the group is empty.
     """
-    above = parents(image)
-    root = name if isinstance(name, str) and name in image.groups else one(image, name).name
+    above = parents(picture)
+    root = (
+        name
+        if isinstance(name, str) and name in picture.groups
+        else layer_named(picture, name).name
+    )
 
     def below(node: str | None) -> bool:
         while node is not None and node != root:
             node = above[node]
         return node is not None
 
-    found = [layer for layer in image.layers if below(layer.name)]
+    found = [layer for layer in picture.layers if below(layer.name)]
     if not found:
         raise UsageError(f"group {name!r} has no layers")
     return found
 
 
-def shown_together(image: Image, name: str | int) -> list[Layer]:
+def shown_together(picture: Picture, name: str | int) -> list[Layer]:
     """The layers whose look changes together: those of a group, or one layer alone."""
-    group = isinstance(name, str) and name in image.groups
-    return members(image, name) if group else [one(image, name)]
+    group = isinstance(name, str) and name in picture.groups
+    return members(picture, name) if group else [layer_named(picture, name)]
 
 
-def parents(image: Image) -> dict[str, str | None]:
+def parents(picture: Picture) -> dict[str, str | None]:
     """The parent of every layer and group, by name."""
-    return {**{layer.name: layer.parent for layer in image.layers}, **image.groups}
+    return {**{layer.name: layer.parent for layer in picture.layers}, **picture.groups}
 
 
-def substituted(image: Image, layers: Iterable[Layer]) -> Image:
-    """The image with some layers replaced by others of the same names."""
+def substituted(picture: Picture, layers: Iterable[Layer]) -> Picture:
+    """The picture with some layers replaced by others of the same names."""
     new = {layer.name: layer for layer in layers}
-    return changed(image, [new.get(layer.name, layer) for layer in image.layers])
+    return changed(picture, [new.get(layer.name, layer) for layer in picture.layers])
 
 
 def changed(
-    image: Image,
+    picture: Picture,
     layers: Sequence[Layer],
     *,
     groups: Mapping[str, str | None] | None = None,
     networks: Sequence[Network] | None = None,
-) -> Image:
-    """The image with other layers, groups or networks, and all that follows from them.
+) -> Picture:
+    """The picture with other layers, groups or networks, and all that follows from them.
 
     Raises:
         UsageError: No layer is left.
     """
     if not layers:
         raise UsageError("this would remove the last layer; a picture needs one")
-    kept = list(image.networks if networks is None else networks)
+    kept = list(picture.networks if networks is None else networks)
     used = {layer.texture.network for layer in layers}
     # Networks that no layer needed before either are none of our business.
-    before = {layer.texture.network for layer in image.layers}
-    while (last := len(kept) - 1) not in used and (last in before or last >= len(image.networks)):
+    before = {layer.texture.network for layer in picture.layers}
+    while (last := len(kept) - 1) not in used and (last in before or last >= len(picture.networks)):
         kept.pop()
     return replace(
-        image,
-        layers=Layers(layers),
+        picture,
+        layers=Layers(settled(layers)),
         networks=tuple(kept),
-        channels=max(image.channels, *(v.texture.channels(kept) for v in layers)),
-        opaque=image.opaque if layers[0] is image.layers[0] else _covers(layers[0], kept),
-        groups=image.groups if groups is None else groups,
-        timeline=image.timeline if any(v.track for v in layers) else None,
-        info=_info(image, layers),
-        extra=tuple(chunk for chunk in image.extra if chunk.safe_to_copy),
+        channels=max(picture.channels, *(v.texture.channels(kept) for v in layers)),
+        opaque=picture.opaque if layers[0] is picture.layers[0] else _covers(layers[0], kept),
+        groups=picture.groups if groups is None else groups,
+        timeline=picture.timeline if any(v.track for v in layers) else None,
+        info=_info(picture, layers),
+        extra=tuple(chunk for chunk in picture.extra if chunk.safe_to_copy),
     )
 
 
@@ -241,28 +246,28 @@ def _covers(back: Layer, networks: Sequence[Network]) -> bool:
     return still and visible and back.texture.channels(networks) == 3
 
 
-def _info(image: Image, layers: Sequence[Layer]) -> Mapping[str, Any] | None:
+def _info(picture: Picture, layers: Sequence[Layer]) -> Mapping[str, Any] | None:
     """The iNFO with an area for each layer; that of a copy is the original's."""
-    if image.info is None or not image.info["areas"]:
-        return image.info
-    areas = dict(zip((v.texture for v in image.layers), image.info["areas"], strict=True))
-    named = dict(zip((v.name for v in image.layers), image.info["areas"], strict=True))
+    if picture.info is None or not picture.info["areas"]:
+        return picture.info
+    areas = dict(zip((v.texture for v in picture.layers), picture.info["areas"], strict=True))
+    named = dict(zip((v.name for v in picture.layers), picture.info["areas"], strict=True))
     return {
-        **image.info,
+        **picture.info,
         "areas": [named.get(v.name, areas.get(v.texture, 0)) for v in layers],
     }
 
 
-def free_name(image: Image, wanted: str) -> str:
+def free_name(picture: Picture, wanted: str) -> str:
     """`wanted`, or with a number if a layer or group has that name."""
-    taken, name, number = parents(image), wanted, 2
+    taken, name, number = parents(picture), wanted, 2
     while name in taken:
         name = f"{wanted} {number}"
         number += 1
     return name
 
 
-def checked_name(image: Image, name: str) -> str:
+def checked_name(picture: Picture, name: str) -> str:
     """A name that is free.
 
     Raises:
@@ -270,6 +275,6 @@ def checked_name(image: Image, name: str) -> str:
     """
     if not 1 <= len(name) <= NAME_MAX or not name.isprintable():
         raise UsageError(f"name {name!r} must have 1..{NAME_MAX} printable characters")
-    if name in parents(image):
+    if name in parents(picture):
         raise UsageError(f"there is a layer or group {name!r} already")
     return name

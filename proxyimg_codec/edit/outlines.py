@@ -10,9 +10,10 @@ import numpy as np
 from ..errors import InputError, UnsupportedError
 from ..export.svg import INKSCAPE, identifiers
 from ..geometry.boundary import COORDINATE_MAX, Boundary
-from ..image import Image, Layer
 from ..io import xml
 from ..limits import DEFAULT_LIMITS, Limits
+from ..model import Layer, Picture, Pictured
+from ..render.neighbours import present_outline
 from .svg_shapes import Points, curves_of, page_of, shapes, tag_of
 
 UNITS = (6, 5, 4)
@@ -26,7 +27,7 @@ _TOKEN = re.compile(r"[A-DF-Za-df-z]|(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
 
 def load(
-    image: Image, data: bytes, name: str = "the SVG", limits: Limits = DEFAULT_LIMITS
+    image: Pictured, data: bytes, name: str = "the SVG", limits: Limits = DEFAULT_LIMITS
 ) -> dict[str, Boundary]:
     """The outlines in an SVG file, by the layer that each belongs to.
 
@@ -48,15 +49,16 @@ def load(
         UnsupportedError: The file has clones, nested documents or even-odd filled holes.
         LimitError: Too large.
     """
+    picture = image.picture
     root = xml.parse(data, name)
     if tag_of(root) != "svg":
         raise InputError(f"{name}: not an SVG file, its root element is {root.tag[:80]!r}")
     drawn = [e.get(key, "") for e in root.iter() for key in ("d", "points")]
     limits.check("segments", sum(1 for text in drawn for _ in _TOKEN.finditer(text)) // 7)
-    page, size = page_of(root, image, name)
+    page, size = page_of(root, picture, name)
     found: dict[str, Boundary | None] = {}
     for element, matrix in shapes(root, page, name):
-        layer = _layer_of(element, image, name)
+        layer = _layer_of(element, picture, name)
         where = f"{name}: layer {layer.name!r}"
         if layer.name in found:
             raise InputError(f"{where}: two shapes have its name; combine them into one path")
@@ -68,7 +70,7 @@ def load(
                 f"{where}: fill-rule evenodd is not supported; set it to nonzero and make its "
                 "holes run the other way (in Inkscape: Path > Union)"
             )
-        found[layer.name] = _boundary(curves, layer, image, where)
+        found[layer.name] = _boundary(curves, layer, picture, where)
         segments = sum(sum(b.segments) for b in found.values() if b is not None)
         limits.check("segments", segments)
     if not found:
@@ -81,11 +83,11 @@ def _fill_rule(element: Element) -> str:
     return styled[1] if styled else element.get("fill-rule", "nonzero")
 
 
-def _layer_of(element: Element, image: Image, name: str) -> Layer:
+def _layer_of(element: Element, picture: Picture, name: str) -> Layer:
     """The layer that a shape's label, id or title names."""
-    names = [layer.name for layer in image.layers]
-    by_id = dict(zip(identifiers(names), image.layers, strict=True))
-    by_name = {xml.text(layer.name): layer for layer in image.layers}
+    names = [layer.name for layer in picture.layers]
+    by_id = dict(zip(identifiers(names), picture.layers, strict=True))
+    by_name = {xml.text(layer.name): layer for layer in picture.layers}
     title = next((child.text or "" for child in element if tag_of(child) == "title"), "")
     label, id_ = element.get(f"{{{INKSCAPE}}}label", ""), element.get("id", "")
     for layer in (by_name.get(label), by_id.get(id_), by_name.get(id_), by_name.get(title)):
@@ -97,12 +99,12 @@ def _layer_of(element: Element, image: Image, name: str) -> Layer:
     )
 
 
-def _boundary(curves: list[Points], layer: Layer, image: Image, where: str) -> Boundary | None:
+def _boundary(curves: list[Points], layer: Layer, picture: Picture, where: str) -> Boundary | None:
     """Curves on the canvas as a boundary; None for what `load` passes over."""
     points = np.concatenate(curves) if curves else np.zeros((0, 2))
     if not np.isfinite(points).all():
         raise InputError(f"{where}: a coordinate is not a finite number")
-    present = layer.outline
+    present = present_outline(picture, layer)
     most = float(np.abs(points).max(initial=0))
     units = [u for u in UNITS if most * (1 << u) < COORDINATE_MAX - 0.5]
     if present is not None and most * (1 << present.unit) < COORDINATE_MAX - 0.5:
@@ -115,11 +117,11 @@ def _boundary(curves: list[Points], layer: Layer, image: Image, where: str) -> B
     if not result.paths:
         raise InputError(f"{where}: its path is empty; draw an outline, or delete it")
     if present is None:
-        sides = image.width << result.unit, image.height << result.unit
+        sides = picture.width << result.unit, picture.height << result.unit
         corners = {(x, y) for x in (0, sides[0]) for y in (0, sides[1])}
         if {(int(x), int(y)) for p in result.paths for x, y in p[::3]} == corners:
             return None
-        if image.opaque and layer is image.layers[0]:
+        if picture.opaque and layer is picture.layers[0]:
             raise InputError(f"{where}: the back layer covers the whole canvas and stays so")
     elif present.unit > UNITS[0] and same(_in_unit(present.unit, curves), present):
         return None

@@ -10,26 +10,26 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from ..errors import PxiError, UsageError
-from ..image import Image
+from ..model import Picture
 from . import appearance, structure, transforms
 from .operations import KINDS, OPERATIONS, run
 
 __all__ = ["OPERATIONS", "appearance", "apply", "parse", "schema", "structure", "transforms"]
 
 
-def apply(image: Image, operations: Iterable[Mapping[str, Any]], first: int = 1) -> Image:
-    """The image after all `operations`, in order; errors count them from `first`.
+def apply(picture: Picture, operations: Iterable[Mapping[str, Any]], first: int = 1) -> Picture:
+    """The picture after all `operations`, in order; errors count them from `first`.
 
     Raises:
         UsageError: One of them is unknown or cannot be done; it says which.
     """
     for number, values in enumerate(operations, first):
         try:
-            image = run(image, values)
+            picture = run(picture, values)
         except PxiError as error:
             error.args = (f"edit {number}: {error}",)
             raise
-    return image
+    return picture
 
 
 def parse(text: str, where: str) -> list[Mapping[str, Any]]:

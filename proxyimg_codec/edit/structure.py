@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ..errors import UsageError
-from ..image import Image, Layer
+from ..model import Layer, Picture
 from .operations import (
     changed,
     checked_name,
     free_name,
-    one,
+    layer_named,
     operation,
     parents,
     shown_together,
@@ -23,18 +23,18 @@ ONE = "layer: a layer's name or position"
 
 
 @operation("remove", layer=TARGET)
-def remove(image: Image, layer: str | int) -> Image:
+def remove(picture: Picture, layer: str | int) -> Picture:
     """Removes a layer, or a group with its layers; what they hid shows."""
-    gone = {v.name for v in shown_together(image, layer)}
-    if isinstance(layer, str) and layer in image.groups:
-        gone |= {name for name in image.groups if _within(image, name, layer)}
-    kept = [v for v in image.layers if v.name not in gone]
-    return _without(image, kept, gone)
+    gone = {v.name for v in shown_together(picture, layer)}
+    if isinstance(layer, str) and layer in picture.groups:
+        gone |= {name for name in picture.groups if _within(picture, name, layer)}
+    kept = [v for v in picture.layers if v.name not in gone]
+    return _without(picture, kept, gone)
 
 
-def _without(image: Image, layers: Sequence[Layer], gone: set[str]) -> Image:
-    """The image without some layers and groups; what was below them moves up."""
-    above = parents(image)
+def _without(picture: Picture, layers: Sequence[Layer], gone: set[str]) -> Picture:
+    """The picture without some layers and groups; what was below them moves up."""
+    above = parents(picture)
 
     def parent(name: str) -> str | None:
         node = above[name]
@@ -42,12 +42,12 @@ def _without(image: Image, layers: Sequence[Layer], gone: set[str]) -> Image:
             node = above[node]
         return node
 
-    groups = {name: parent(name) for name in image.groups if name not in gone}
-    return changed(image, [replace(v, parent=parent(v.name)) for v in layers], groups=groups)
+    groups = {name: parent(name) for name in picture.groups if name not in gone}
+    return changed(picture, [replace(v, parent=parent(v.name)) for v in layers], groups=groups)
 
 
-def _within(image: Image, name: str, group: str) -> bool:
-    above = parents(image)
+def _within(picture: Picture, name: str, group: str) -> bool:
+    above = parents(picture)
     node: str | None = name
     while node is not None and node != group:
         node = above[node]
@@ -55,45 +55,45 @@ def _within(image: Image, name: str, group: str) -> bool:
 
 
 @operation("duplicate", layer=ONE, name="text?: the copy's name")
-def duplicate(image: Image, layer: str | int, name: str | None = None) -> Image:
+def duplicate(picture: Picture, layer: str | int, name: str | None = None) -> Picture:
     """Copies a layer, in front of it; both share one texture."""
-    chosen = one(image, layer)
+    chosen = layer_named(picture, layer)
     if name is None:
-        name = free_name(image, f"{chosen.name} copy")
-    copy = replace(chosen, name=checked_name(image, name))
-    layers = list(image.layers)
-    layers.insert(_position(image, chosen) + 1, copy)
-    return changed(image, layers)
+        name = free_name(picture, f"{chosen.name} copy")
+    copy = replace(chosen, name=checked_name(picture, name))
+    layers = list(picture.layers)
+    layers.insert(_position(picture, chosen) + 1, copy)
+    return changed(picture, layers)
 
 
-def _position(image: Image, layer: Layer) -> int:
-    return next(i for i, v in enumerate(image.layers) if v is layer)
+def _position(picture: Picture, layer: Layer) -> int:
+    return next(i for i, v in enumerate(picture.layers) if v is layer)
 
 
 @operation("rename", layer=TARGET, name="text: a name that is free")
-def rename(image: Image, layer: str | int, name: str) -> Image:
+def rename(picture: Picture, layer: str | int, name: str) -> Picture:
     """Gives a layer or group another name."""
-    old = layer if layer in image.groups else one(image, layer).name
-    checked_name(image, name)
+    old = layer if layer in picture.groups else layer_named(picture, layer).name
+    checked_name(picture, name)
 
     def renamed(value: str | None) -> str | None:
         return name if value == old else value
 
     layers = [
         replace(v, name=name if v.name == old else v.name, parent=renamed(v.parent))
-        for v in image.layers
+        for v in picture.layers
     ]
-    groups = {name if k == old else k: renamed(v) for k, v in image.groups.items()}
-    return changed(image, layers, groups=groups)
+    groups = {name if k == old else k: renamed(v) for k, v in picture.groups.items()}
+    return changed(picture, layers, groups=groups)
 
 
 @operation("order", layer=ONE,
            to="place: a position from the back, or front, back, forward, backward")  # fmt: skip
-def order(image: Image, layer: str | int, to: int | str) -> Image:
+def order(picture: Picture, layer: str | int, to: int | str) -> Picture:
     """Puts a layer elsewhere in the stack; `back` is just in front of an opaque back layer."""
-    chosen = one(image, layer)
-    last, now = len(image.layers) - 1, _position(image, chosen)
-    bottom = 1 if image.opaque and now > 0 else 0
+    chosen = layer_named(picture, layer)
+    last, now = len(picture.layers) - 1, _position(picture, chosen)
+    bottom = 1 if picture.opaque and now > 0 else 0
     places = {
         "front": last, "back": bottom,
         "forward": min(now + 1, last), "backward": max(now - 1, bottom),
@@ -101,55 +101,55 @@ def order(image: Image, layer: str | int, to: int | str) -> Image:
     place = to if isinstance(to, int) else places.get(to)
     if place is None or not 0 <= place <= last:
         raise UsageError(f"order: {to!r} is neither 0..{last} nor one of {', '.join(places)}")
-    layers = [v for v in image.layers if v is not chosen]
+    layers = [v for v in picture.layers if v is not chosen]
     layers.insert(place, chosen)
-    return changed(image, layers)
+    return changed(picture, layers)
 
 
 @operation("group", layers="layers: names or positions of layers, or names of groups",
            name="text: the group's name; one that exists grows")  # fmt: skip
-def group(image: Image, layers: Sequence[str | int], name: str) -> Image:
+def group(picture: Picture, layers: Sequence[str | int], name: str) -> Picture:
     """Puts layers and groups into a group, which is edited as one."""
-    groups = dict(image.groups)
+    groups = dict(picture.groups)
     if name not in groups:
-        groups[checked_name(image, name)] = None
-    inner = [v if v in image.groups else one(image, v).name for v in layers]
+        groups[checked_name(picture, name)] = None
+    inner = [v if v in picture.groups else layer_named(picture, v).name for v in layers]
     for each in inner:
         if each in groups:
-            if each == name or (name in image.groups and _within(image, name, str(each))):
+            if each == name or (name in picture.groups and _within(picture, name, str(each))):
                 raise UsageError(f"group: {each!r} would become a part of itself")
             groups[str(each)] = name
-    new = [replace(v, parent=name) if v.name in inner else v for v in image.layers]
-    result = changed(image, new, groups=groups)
+    new = [replace(v, parent=name) if v.name in inner else v for v in picture.layers]
+    result = changed(picture, new, groups=groups)
     _check_acyclic(result, "group")
     return result
 
 
 @operation("ungroup", name="text: a group")
-def ungroup(image: Image, name: str) -> Image:
+def ungroup(picture: Picture, name: str) -> Picture:
     """Dissolves a group; its layers stay."""
-    if name not in image.groups:
+    if name not in picture.groups:
         raise UsageError(f"ungroup: there is no group {name!r}")
-    return _without(image, list(image.layers), {name})
+    return _without(picture, list(picture.layers), {name})
 
 
 @operation("parent", layer=TARGET, to="text: a layer or group that it follows; empty for none")
-def parent(image: Image, layer: str | int, to: str) -> Image:
+def parent(picture: Picture, layer: str | int, to: str) -> Picture:
     """Lets a layer or group follow another one."""
-    if to and to not in parents(image):
+    if to and to not in parents(picture):
         raise UsageError(f"parent: there is no layer or group {to!r}")
     above = to or None
-    if layer in image.groups:
-        groups = {**image.groups, str(layer): above}
-        result = changed(image, list(image.layers), groups=groups)
+    if layer in picture.groups:
+        groups = {**picture.groups, str(layer): above}
+        result = changed(picture, list(picture.layers), groups=groups)
     else:
-        result = substituted(image, [replace(one(image, layer), parent=above)])
+        result = substituted(picture, [replace(layer_named(picture, layer), parent=above)])
     _check_acyclic(result, "parent")
     return result
 
 
-def _check_acyclic(image: Image, what: str) -> None:
-    above = parents(image)
+def _check_acyclic(picture: Picture, what: str) -> None:
+    above = parents(picture)
     for name in above:
         seen, node = set(), above[name]
         while node is not None:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, UnsupportedError
 from ..export.svg import NAMESPACE
-from ..image import Image
+from ..model import Picture
 
 try:
     import svgelements
@@ -44,7 +44,7 @@ def tag_of(element: Element) -> str:
     return local if namespace in ("", "{" + NAMESPACE) else ""
 
 
-def page_of(root: Element, image: Image, name: str) -> tuple[Points, tuple[float, float]]:
+def page_of(root: Element, picture: Picture, name: str) -> tuple[Points, tuple[float, float]]:
     """The transform [3, 3] from user units to canvas pixels, and the page in user units."""
     try:
         if "viewBox" in root.attrib:
@@ -53,9 +53,9 @@ def page_of(root: Element, image: Image, name: str) -> tuple[Points, tuple[float
             x = y = 0.0
             width, height = (
                 _pixels(root.get(key, "100%"), default)
-                for key, default in (("width", image.width), ("height", image.height))
+                for key, default in (("width", picture.width), ("height", picture.height))
             )
-        scale = image.width / width, image.height / height
+        scale = picture.width / width, picture.height / height
         good = all(map(math.isfinite, (x, y, *scale))) and min(scale) > 0
     except _MALFORMED:
         good = False
@@ -64,7 +64,7 @@ def page_of(root: Element, image: Image, name: str) -> tuple[Points, tuple[float
     if abs(scale[0] / scale[1] - 1) > ASPECT:
         raise InputError(
             f"{name}: the page of {width:g}x{height:g} has another shape than the canvas of "
-            f"{image.width}x{image.height}; set the page back"
+            f"{picture.width}x{picture.height}; set the page back"
         )
     matrix = np.diag([*scale, 1.0])
     matrix[:2, 2] = -scale[0] * x, -scale[1] * y

@@ -12,14 +12,13 @@ from numpy.typing import NDArray
 from ..errors import UsageError
 from ..geometry import mesher
 from ..geometry.boundary import COORDINATE_MAX, Boundary
-from ..geometry.mesh import FRACTION_BITS, Mesh
+from ..geometry.mesh import FRACTION_BITS
 from ..geometry.pose import NODE_BITS, NODE_MAX, Matrix, Pose, fixed, inverse, product
-from ..image import Image, Layer
+from ..io.files import read_bytes
+from ..model import Layer, Picture
+from ..render.neighbours import present_outline
 from . import deform
-from .operations import members, one, operation, substituted
-
-EDGE_FRONT, EDGE_BACK = 0.05, 0.2
-"""Edge lengths of meshes relative to the diagonal of a layer (ProxyImg, l_r^f and l_r^b)."""
+from .operations import layer_named, members, operation, substituted
 
 REST_UNIT = 6
 """Unit of boundaries that are brought back to rest from where a layer is now."""
@@ -31,23 +30,22 @@ TARGET = "layer: a layer's name or position, or a group's name"
 PIVOT = "pair?: a canvas point x, y; by default the centre of the layer or group"
 
 
-def centre(layers: Sequence[Layer]) -> tuple[float, float]:
+def centre(picture: Picture, layers: Sequence[Layer]) -> tuple[float, float]:
     """The middle of what bounds layers, in canvas pixels; a multiple of 1/2048.
 
     Sums of such bounds are exact, so that mirroring twice about the centre is too.
     """
-    x0, y0, x1, y1 = bounds(layers)
+    x0, y0, x1, y1 = bounds(picture, layers)
     return round((x0 + x1) * _SCALE) / (2 * _SCALE), round((y0 + y1) * _SCALE) / (2 * _SCALE)
 
 
-def bounds(layers: Sequence[Layer]) -> tuple[float, float, float, float]:
+def bounds(picture: Picture, layers: Sequence[Layer]) -> tuple[float, float, float, float]:
     """x0, y0, x1, y1 of the rectangle round the present outlines of layers, in canvas pixels."""
     points = []
     for layer in layers:
-        assert layer.image is not None
-        shape = layer.outline
+        shape = present_outline(picture, layer)
         if shape is None:
-            points.append(np.array([[0, 0], [layer.image.width, layer.image.height]], float))
+            points.append(np.array([[0, 0], picture.size], float))
         else:
             points.append(sampled(shape))
     every = np.concatenate(points)
@@ -66,17 +64,19 @@ def sampled(boundary: Boundary) -> NDArray[np.float64]:
     return np.asarray(np.concatenate(parts) / (1 << boundary.unit))
 
 
-def mapped(image: Image, target: str | int, matrix: Matrix, pivot: Pair | None, what: str) -> Image:
+def mapped(
+    picture: Picture, target: str | int, matrix: Matrix, pivot: Pair | None, what: str
+) -> Picture:
     """The layers of a target under an affine map about a pivot.
 
     Raises:
         UsageError: The result is singular, or too large or too far away.
     """
-    layers = members(image, target)
+    layers = members(picture, target)
     if pivot is None:
         # Of a layer that others follow the centre is its own.
-        single = not (isinstance(target, str) and target in image.groups)
-        pivot = centre([one(image, target)] if single else layers)
+        single = not (isinstance(target, str) and target in picture.groups)
+        pivot = centre(picture, [layer_named(picture, target)] if single else layers)
     x, y = pivot
     about = product((1, 0, 0, 1, x, y), product(matrix, (1, 0, 0, 1, -x, -y)))
     moved = []
@@ -88,75 +88,71 @@ def mapped(image: Image, target: str | int, matrix: Matrix, pivot: Pair | None, 
                 "large, or leave the range of coordinates"
             )
         moved.append(replace(layer, pose=replace(layer.pose, matrix=values[0], shift=values[1])))
-    return substituted(image, moved)
+    return substituted(picture, moved)
 
 
 @operation("move", layer=TARGET, by="pair: dx, dy in canvas pixels")
-def move(image: Image, layer: str | int, by: Pair) -> Image:
+def move(picture: Picture, layer: str | int, by: Pair) -> Picture:
     """Moves a layer; there and back is exact."""
     dx, dy = (round(v * _SCALE) for v in by)
     moved = []
-    for each in members(image, layer):
+    for each in members(picture, layer):
         e, f = each.pose.shift
         pose = replace(each.pose, shift=(e + dx, f + dy))
         if fixed(pose.floats) is None:
             raise UsageError(f"move: layer {each.name!r} would leave the range of coordinates")
         moved.append(replace(each, pose=pose))
-    return substituted(image, moved)
+    return substituted(picture, moved)
 
 
 @operation("rotate", layer=TARGET, degrees="number: an angle, clockwise", pivot=PIVOT)
-def rotate(image: Image, layer: str | int, degrees: float, pivot: Pair | None = None) -> Image:
+def rotate(
+    picture: Picture, layer: str | int, degrees: float, pivot: Pair | None = None
+) -> Picture:
     """Turns a layer."""
     turns, rest = divmod(degrees, 90)
     c, s = math.cos(math.radians(rest)), math.sin(math.radians(rest))
     for _ in range(int(turns % 4)):  # quarter turns are exact
         c, s = -s, c
-    return mapped(image, layer, (c, s, -s, c, 0, 0), pivot, "rotate")
+    return mapped(picture, layer, (c, s, -s, c, 0, 0), pivot, "rotate")
 
 
 @operation("scale", layer=TARGET, by="pair: factors across and down", pivot=PIVOT)
-def scale(image: Image, layer: str | int, by: Pair, pivot: Pair | None = None) -> Image:
+def scale(picture: Picture, layer: str | int, by: Pair, pivot: Pair | None = None) -> Picture:
     """Makes a layer larger or smaller."""
-    return mapped(image, layer, (by[0], 0, 0, by[1], 0, 0), pivot, "scale")
+    return mapped(picture, layer, (by[0], 0, 0, by[1], 0, 0), pivot, "scale")
 
 
 @operation("shear", layer=TARGET, by="pair: growth of x a pixel of y, and of y a pixel of x",
            pivot=PIVOT)  # fmt: skip
-def shear(image: Image, layer: str | int, by: Pair, pivot: Pair | None = None) -> Image:
+def shear(picture: Picture, layer: str | int, by: Pair, pivot: Pair | None = None) -> Picture:
     """Slants a layer."""
-    return mapped(image, layer, (1, by[1], by[0], 1, 0, 0), pivot, "shear")
+    return mapped(picture, layer, (1, by[1], by[0], 1, 0, 0), pivot, "shear")
 
 
 @operation("affine", layer=TARGET, matrix="matrix: a, b, c, d, e, f as in SVG", pivot=PIVOT)
 def affine(
-    image: Image, layer: str | int, matrix: Sequence[float], pivot: Pair | None = None
-) -> Image:
+    picture: Picture, layer: str | int, matrix: Sequence[float], pivot: Pair | None = None
+) -> Picture:
     """Maps a layer by x' = a x + c y + e, y' = b x + d y + f, about the pivot."""
     a, b, c, d, e, f = matrix
-    return mapped(image, layer, (a, b, c, d, e, f), pivot, "affine")
+    return mapped(picture, layer, (a, b, c, d, e, f), pivot, "affine")
 
 
 @operation("flip", layer=TARGET, axis="axis: horizontal or vertical", pivot=PIVOT)
 def flip(
-    image: Image, layer: str | int, axis: str = "horizontal", pivot: Pair | None = None
-) -> Image:
+    picture: Picture, layer: str | int, axis: str = "horizontal", pivot: Pair | None = None
+) -> Picture:
     """Mirrors a layer; twice is exact."""
     across, down = (-1, 1) if axis == "horizontal" else (1, -1)
-    return mapped(image, layer, (across, 0, 0, down, 0, 0), pivot, "flip")
+    return mapped(picture, layer, (across, 0, 0, down, 0, 0), pivot, "flip")
 
 
-def meshed(layer: Layer, edge: float | None = None) -> Layer:
-    """The layer with a mesh: its own, or one derived from its shape, with edges of length `edge`.
-
-    Lengths are relative to the diagonal of the shape; None = what suits edits.
-    """
+def meshed(picture: Picture, layer: Layer) -> Layer:
+    """The layer with a mesh: its own, or one derived from its shape."""
     if layer.mesh is not None:
         return layer
-    assert layer.image is not None
-    size = (layer.image.width, layer.image.height)
-    edge = edge or (EDGE_BACK if layer.boundary is None else EDGE_FRONT)
-    return replace(layer, mesh=Mesh.build(mesher.delaunay(layer.boundary, size, edge)))
+    return replace(layer, mesh=mesher.derived(layer.boundary, picture.size))
 
 
 @operation(
@@ -164,16 +160,16 @@ def meshed(layer: Layer, edge: float | None = None) -> Layer:
     layer="layer: a layer's name or position",
     handles="handles: a list of 1 to 500 x, y, dx, dy: points of the layer and where they go",
 )
-def drag(image: Image, layer: str | int, handles: Sequence[Sequence[float]]) -> Image:
+def drag(picture: Picture, layer: str | int, handles: Sequence[Sequence[float]]) -> Picture:
     """Bends a layer so that points of it move; a point with 0, 0 stays."""
-    chosen = meshed(one(image, layer))
+    chosen = meshed(picture, layer_named(picture, layer))
     assert chosen.mesh is not None
     refined, pose = chosen.mesh.refined, chosen.pose
     values = np.array(handles, float)
     present = pose.present(refined) / _SCALE
     rest = pose.apply(refined.nodes) / _SCALE
     moved = deform.drag(present, refined.faces, values[:, :2], values[:, :2] + values[:, 2:], rest)
-    return substituted(image, [replace(chosen, pose=_bent(chosen, moved))])
+    return substituted(picture, [replace(chosen, pose=_bent(chosen, moved))])
 
 
 def _bent(layer: Layer, present: NDArray[np.float64]) -> Pose:
@@ -194,9 +190,9 @@ def _bent(layer: Layer, present: NDArray[np.float64]) -> Pose:
            path="integer: a path of the boundary, counted from 0",
            point="integer: a control point of the path, counted from 0",
            by="pair: dx, dy in canvas pixels")  # fmt: skip
-def point(image: Image, layer: str | int, path: int, point: int, by: Pair) -> Image:
+def point(picture: Picture, layer: str | int, path: int, point: int, by: Pair) -> Picture:
     """Moves one control point of a boundary, in steps of the boundary's unit."""
-    chosen = one(image, layer)
+    chosen = layer_named(picture, layer)
     shape = chosen.boundary
     if shape is None:
         raise UsageError(f"point: layer {chosen.name!r} has no boundary")
@@ -211,21 +207,21 @@ def point(image: Image, layer: str | int, path: int, point: int, by: Pair) -> Im
         raise UsageError("point: the control point would leave the range of coordinates")
     points[point] += np.rint(step).astype(np.int64)
     paths = (*shape.paths[:path], points, *shape.paths[path + 1 :])
-    return substituted(image, [replace(chosen, boundary=Boundary(shape.unit, paths))])
+    return substituted(picture, [replace(chosen, boundary=Boundary(shape.unit, paths))])
 
 
 @operation("outlines", source="text: the name of an SVG file, whose paths name layers")
-def outlines(image: Image, source: str) -> Image:
+def outlines(picture: Picture, source: str) -> Picture:
     """Takes the boundaries of layers from an SVG file, such as `pxi-decode` writes."""
-    from ..io.files import read_bytes
     from .outlines import load, same
 
     new = []
-    for name, shape in load(image, read_bytes(source), source).items():
-        layer = one(image, name)
-        if layer.outline is None or not same(shape, layer.outline):
+    for name, shape in load(picture, read_bytes(source), source).items():
+        layer = layer_named(picture, name)
+        outline = present_outline(picture, layer)
+        if outline is None or not same(shape, outline):
             new.append(replace(layer, boundary=_at_rest(layer, shape)))
-    return substituted(image, new)
+    return substituted(picture, new)
 
 
 def _at_rest(layer: Layer, shape: Boundary) -> Boundary:

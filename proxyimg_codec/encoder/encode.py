@@ -1,4 +1,4 @@
-"""From a picture to an `Image`: layers, boundaries, fitted and quantized textures."""
+"""From a picture to an `Picture`: layers, boundaries, fitted and quantized textures."""
 
 from __future__ import annotations
 
@@ -11,16 +11,18 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import __version__
+from .._version import __version__
 from ..container import meta
-from ..errors import InputError, UsageError
-from ..image import Image, Layer, Layers
+from ..errors import UsageError
+from ..io.samples import to_float
 from ..limits import DEFAULT_LIMITS
+from ..model import Layer, Layers, Picture
 from ..texture.implicit import ImplicitTexture
 from ..texture.network import Floats, NetShape, Network
 from .completion.occluded import extended
 from .implicit import fit, node_problem
 from .implicit.fit_problem import Problem, build
+from .implicit.state import State, quantize, rows_of
 from .settings import Settings
 from .shapes.layers import Plan, plan_layers
 from .shapes.masks import Region
@@ -45,7 +47,7 @@ def encode(
     blocks: Mapping[str, bytes] | None = None,
     progress: Progress | None = None,
     **options: Any,
-) -> Image:
+) -> Picture:
     """Encodes a picture.
 
     Args:
@@ -115,7 +117,7 @@ def fit_image(
     size: tuple[int, int],
     settings: Settings,
     report: Callable[[str, int, int], None],
-) -> Image:
+) -> Picture:
     """The 8-bit picture, without metadata, of planned layers.
 
     Args:
@@ -146,7 +148,7 @@ def fit_image(
         Layer(layer.name, plane.box, layer.boundary, texture, layer.mesh, problem.sampling)
         for layer, plane, texture in zip(plan.layers, problem.planes, textures, strict=True)
     ]
-    return Image(*size, plan.channels, plan.opaque, 8, Layers(layers), (network,), info=info)
+    return Picture(*size, plan.channels, plan.opaque, 8, Layers(layers), (network,), info=info)
 
 
 def check_blocks(blocks: Mapping[str, bytes]) -> None:
@@ -158,42 +160,9 @@ def check_blocks(blocks: Mapping[str, bytes]) -> None:
             )
 
 
-def to_float(pixels: NDArray[Any]) -> tuple[Floats, int]:
-    """A picture as float32 [H, W, 4] with straight alpha in 0..1, and its depth, 8 or 16.
-
-    Raises:
-        InputError: Wrong shape or type, empty, not finite, or outside 0..1.
-    """
-    if pixels.ndim == 2:
-        pixels = pixels[..., None]
-    if pixels.ndim != 3 or not 1 <= pixels.shape[2] <= 4 or pixels.size == 0:
-        raise InputError(
-            f"a picture must be [H, W] or [H, W, 1..4] and not empty, not {pixels.shape}"
-        )
-    if pixels.dtype in (np.uint8, np.uint16):
-        depth = 8 * pixels.dtype.itemsize
-        values = pixels.astype(np.float32) / np.float32(np.iinfo(pixels.dtype).max)
-    elif pixels.dtype.kind == "f":
-        depth, values = 16, pixels.astype(np.float32)
-        if not np.isfinite(values).all():
-            raise InputError("the picture has NaN or infinite samples; replace them first")
-        if values.min() < 0 or values.max() > 1:
-            raise InputError("floating-point samples must lie in 0..1; scale or clip them first")
-    else:
-        raise InputError(
-            f"samples of type {pixels.dtype} are not supported; use uint8, uint16 or float"
-        )
-    channels = values.shape[2]
-    out = np.ones((*values.shape[:2], 4), np.float32)
-    out[..., :3] = values[..., :3] if channels > 2 else values[..., :1]
-    if channels in (2, 4):
-        out[..., 3] = values[..., -1]
-    return out, depth
-
-
 def _fit(
     problem: Problem, settings: Settings, report: Callable[[str, int, int], None]
-) -> tuple[fit.State, list[NDArray[np.bool_]]]:
+) -> tuple[State, list[NDArray[np.bool_]]]:
     """Fitted state, and the mask of stored codes of each layer."""
     if (problem.target == problem.target[0]).all():
         return constant(problem, settings), problem.stored()
@@ -224,29 +193,29 @@ def _fit(
     return state, stored
 
 
-def constant(problem: Problem, settings: Settings) -> fit.State:
+def constant(problem: Problem, settings: Settings) -> State:
     """The state of a picture of one colour: the output bias says it all."""
     state = fit.initial(problem, settings.seed)
     state.codes[:] = 0
     state.weights[:] = 0
-    fit.rows_of(problem.shape, state.weights)[-1][1][:] = problem.target[0]
+    rows_of(problem.shape, state.weights)[-1][1][:] = problem.target[0]
     state.code_bits, state.net_bits = settings.bits, settings.weight_bits
     return state
 
 
 def assemble(
-    problem: Problem, state: fit.State, stored: list[NDArray[np.bool_]], settings: Settings
+    problem: Problem, state: State, stored: list[NDArray[np.bool_]], settings: Settings
 ) -> tuple[Network, list[ImplicitTexture]]:
     """The quantized network and textures of a fitted state."""
     shape: NetShape = problem.shape
-    rows = fit.rows_of(shape, state.weights)
+    rows = rows_of(shape, state.weights)
     ends = np.cumsum([o for _, o in shape.layers])[:-1]
     steps = np.split(state.row_steps, ends)
     network = Network(
         shape,
         settings.weight_bits,
         tuple(
-            fit.quantize(w, s[:, None], settings.weight_bits)
+            quantize(w, s[:, None], settings.weight_bits)
             for (w, _), s in zip(rows, steps, strict=True)
         ),
         state.row_steps.astype(np.float16),
@@ -255,7 +224,7 @@ def assemble(
     textures = []
     for k, plane in enumerate(problem.planes):
         values = state.codes[plane.start : plane.start + plane.size]
-        codes = fit.quantize(values, state.code_steps[k], settings.bits)
+        codes = quantize(values, state.code_steps[k], settings.bits)
         codes = np.where(stored[k].reshape(-1, 1), codes, np.int8(0)).T
         textures.append(
             ImplicitTexture(

@@ -1,4 +1,4 @@
-"""From a layered picture to an `Image`: every layer becomes one of its own.
+"""From a layered picture to an `Picture`: every layer becomes one of its own.
 
 Other than from a flat picture, a layer's texture is learnt from all of its own pixels, also those
 that others hide.
@@ -15,11 +15,12 @@ import numpy as np
 
 from ..errors import InputError
 from ..geometry.pose import OPACITY_MAX, Pose
-from ..image import Image, Layer, Layers
+from ..io.samples import to_float
 from ..limits import DEFAULT_LIMITS
+from ..model import Layer, Layers, Picture
 from ..texture.implicit import ImplicitTexture
 from ..texture.network import Floats, NetShape, Network
-from .encode import Progress, check_blocks, fit_image, to_float
+from .encode import Progress, check_blocks, fit_image
 from .implicit.fit_problem import Problem, build_apart
 from .openraster import LayeredPicture, SourceLayer
 from .settings import Settings
@@ -36,7 +37,7 @@ SURE = 0.5
 
 def encode_layers(
     picture: LayeredPicture, settings: Settings | None = None, progress: Progress | None = None
-) -> tuple[Image, LayeredPicture]:
+) -> tuple[Picture, LayeredPicture]:
     """Encodes a layered picture, layer by layer.
 
     Args:
@@ -92,7 +93,7 @@ def _fitted(
     plan: Plan,
     settings: Settings,
     report: Callable[[str, int, int], None],
-) -> Image:
+) -> Picture:
     """The layers of `picture` as those of an image with one network."""
     size = (picture.width, picture.height)
 
@@ -106,7 +107,7 @@ def _fitted(
     return fit_image(problem_of, pixels, plan, size, settings, report)
 
 
-def _merged(parts: Sequence[Image], picture: LayeredPicture, opaque: bool) -> Image:
+def _merged(parts: Sequence[Picture], picture: LayeredPicture, opaque: bool) -> Picture:
     """One image of parts that share the layers of `picture`, with their poses and groups."""
     sources = picture.layers
     paths = {s.groups[: i + 1]: "" for s in sources for i in range(len(s.groups))}

@@ -33,6 +33,9 @@ NODE_SHARE = 0.3
 NODE_SPACING = 8.0
 """Canvas pixels between codes at quality 50 with node sampling (ProxyImg, o)."""
 
+LAYERS_MAX = 64
+"""Most layers of a picture that is encoded: the trainer composites that many in a pixel."""
+
 TEXTURES = ("auto", "implicit", "pyramid")
 TUNES = ("mse", "ms-ssim")
 SAMPLINGS = ("direct", "node")

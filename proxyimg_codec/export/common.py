@@ -6,35 +6,37 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ..geometry.pose import OPACITY_MAX
-from ..image import Image, Layer, Layers
+from ..model import Layer, Layers, Picture
+from ..render.neighbours import present_outline
+from ..render.pixels import selected
 
 
 def chosen_layers(
-    image: Image, layers: Sequence[str | int] | None, background: bool
+    picture: Picture, layers: Sequence[str | int] | None, background: bool
 ) -> list[Layer]:
     """The layers to export, back to front; by default all, hidden ones too.
 
     Raises:
         UsageError: An unknown layer, or none at all.
     """
-    return image._select(range(len(image.layers)) if layers is None else layers, background)
+    return selected(picture, range(len(picture.layers)) if layers is None else layers, background)
 
 
-def region_of(image: Image, layer: Layer) -> tuple[int, int, int, int]:
+def region_of(picture: Picture, layer: Layer) -> tuple[int, int, int, int]:
     """The part of the canvas that holds a layer: x, y, width, height, at least one pixel."""
-    outline = layer.outline
+    outline = present_outline(picture, layer)
     if outline is None:
-        return 0, 0, image.width, image.height
+        return 0, 0, picture.width, picture.height
     x0, y0, x1, y1 = outline.bounds()
-    x0, y0 = min(max(x0, 0), image.width - 1), min(max(y0, 0), image.height - 1)
-    x1, y1 = max(min(x1, image.width), x0 + 1), max(min(y1, image.height), y0 + 1)
+    x0, y0 = min(max(x0, 0), picture.width - 1), min(max(y0, 0), picture.height - 1)
+    x1, y1 = max(min(x1, picture.width), x0 + 1), max(min(y1, picture.height), y0 + 1)
     return x0, y0, x1 - x0, y1 - y0
 
 
-def at_full_opacity(image: Image) -> Image:
+def at_full_opacity(picture: Picture) -> Picture:
     """The picture with all layers at full opacity."""
-    layers = [replace(v, pose=replace(v.pose, opacity=OPACITY_MAX)) for v in image.layers]
-    return replace(image, layers=Layers(layers))
+    layers = [replace(v, pose=replace(v.pose, opacity=OPACITY_MAX)) for v in picture.layers]
+    return replace(picture, layers=Layers(layers))
 
 
 def opacity_text(layer: Layer) -> str:

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..geometry.coverage import ONE
-from ..image import Image, Layer
+from ..model import Layer, Picture, Pictured
+from ..render.neighbours import present_outline
+from ..render.pixels import selected
 from .onnx_graph import Graph, Value
 from .onnx_renderer_coverage import chords, coverage
 from .onnx_renderer_texture import colour
@@ -41,12 +43,12 @@ time, without what none of them can see. Memory is that of so many, whatever N i
 
 
 def build(
-    image: Image, layers: Sequence[str | int] | None = None, background: bool = True
+    image: Pictured, layers: Sequence[str | int] | None = None, background: bool = True
 ) -> onnx.ModelProto:
     """The model: `points` float64 [N, 2] and `pixel_size` float64 [2] -> `colour` float32 [N, 4].
 
     Args:
-        image: A still picture: `Image.at` gives that of a moment.
+        image: A still picture: `render.moment.at` gives that of a moment.
         layers: Names or positions of what is drawn; all that are not hidden by default.
         background: Whether to draw the back layer of an opaque picture.
 
@@ -54,17 +56,19 @@ def build(
         UsageError: An unknown layer, or none is left to draw.
         UnsupportedError: onnx is not installed, or the model would be larger than 2 GiB.
     """
-    chosen = image._select(layers, background)
+    picture = image.picture
+    chosen = selected(picture, layers, background)
     graph = Graph()
     # All that decides is in double precision, as the specification has it.
     points = graph.input("points", np.float64, ["N", 2])
     size = graph.input("pixel_size", np.float64, [2])
     first = points.take(0)
     corner = first - size / 2
+    places = [(layer, present_outline(picture, layer)) for layer in chosen]
     outlines = {
-        layer: chords(graph, layer.outline, corner, size)
-        for layer in chosen
-        if layer.outline is not None
+        layer: chords(graph, outline, corner, size)
+        for layer, outline in places
+        if outline is not None
     }
     corners = graph.op("Round", (points - first) / size * ONE)
     blocks, count = _blocks(points)
@@ -78,7 +82,7 @@ def build(
             if layer in outlines:
                 covered = coverage(outlines[layer], corner).reshape(-1, 1)
                 weight = clear * covered
-            seen = _seen(layer, at, weight) * weight
+            seen = _seen(picture, layer, at, weight) * weight
             result = result + seen
             clear = clear - seen.take(np.array([3]), 1)
         return result
@@ -86,10 +90,10 @@ def build(
     rows = graph.scan(blocks, block).reshape(-1, 4)
     start, axes = np.array([0]), np.array([0])
     result = graph.op("Slice", rows, start, count, axes, name="colour")
-    said = [DOCUMENTATION, f"The canvas has {image.width} by {image.height} pixels."]
-    if image.opaque and image.layers[0] in chosen:
+    said = [DOCUMENTATION, f"The canvas has {picture.width} by {picture.height} pixels."]
+    if picture.opaque and picture.layers[0] in chosen:
         said.append("The picture is opaque: alpha is to be ignored.")
-    canvas = {"width": str(image.width), "height": str(image.height)}
+    canvas = {"width": str(picture.width), "height": str(picture.height)}
     return graph.model("proxyimg_renderer", [(result, ["N", 4])], "\n".join(said), canvas)
 
 
@@ -105,14 +109,14 @@ def _blocks(points: Value) -> tuple[Value, Value]:
     return numbers.minimum(count - 1).reshape(-1, BLOCK), count
 
 
-def _seen(layer: Layer, at: Value, weight: Value) -> Value:
+def _seen(picture: Picture, layer: Layer, at: Value, weight: Value) -> Value:
     """Colour float32 [BLOCK, 4] of a layer at points, 0 where its weight is 0."""
     graph = at.graph
     nothing = graph.constant(np.zeros((BLOCK, 4), np.float32))
 
     def some() -> Value:
         index = graph.op("NonZero", weight.reshape(-1), dtype=np.int64).reshape(-1)
-        found = colour(layer, locate(layer, at.take(index)))
+        found = colour(picture, layer, locate(layer, at.take(index)))
         return graph.op("ScatterND", nothing, index.reshape(-1, 1), found)
 
     return graph.choose(weight.reduced("Max") > 0, some, lambda: nothing)

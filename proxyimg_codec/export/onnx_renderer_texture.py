@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 
 from ..geometry.mesh import FRACTION_BITS
 from ..geometry.pose import COLOUR_BITS, OPACITY_MAX, Pose
-from ..image import Layer
+from ..model import Layer, Picture
+from ..render.neighbours import moved_neighbours
 from ..texture import diffusion, node_sampling
 from ..texture.implicit import ImplicitTexture
+from ..texture.network import Floats
 from ..texture.pyramid import TAPS, PyramidTexture
 from .onnx_graph import Graph, Value
 from .onnx_network import forward
@@ -21,15 +23,19 @@ SAMPLE_ONE = 65535
 """The sample 1.0 of a raster as the model stores it."""
 
 
-def colour(layer: Layer, shown: Shown) -> Value:
+def colour(picture: Picture, layer: Layer, shown: Shown) -> Value:
     """Premultiplied colour and alpha float32 [N, 4] of samples of a layer in its pose."""
     texture, graph = layer.texture, shown.points.graph
     if isinstance(texture, PyramidTexture):
-        found, channels = _sampled(layer, texture, shown.points), texture.channels(())
+        padded = texture.padded(moved_neighbours(picture, layer))
+        found, channels = _sampled(layer, texture, padded, shown.points), texture.channels(())
     else:
-        network = layer.network
+        network = picture.network_of(layer)
         assert network is not None, "an implicit texture has a network"
-        features = (_at_nodes if layer.sampling else _features)(layer, texture, shown)
+        if layer.sampling:
+            features = _at_nodes(picture, layer, texture, shown)
+        else:
+            features = _features(layer, texture, shown)
         found, channels = forward(network, features), network.shape.channels
     return _posed(layer.pose, _premultiplied(graph, found, channels))
 
@@ -91,22 +97,20 @@ def _before(points: Value, axis: int, start: int, scale: float, count: int) -> t
     return before.astype(np.int64), (at - before).astype(np.float32)
 
 
-def _at_nodes(layer: Layer, texture: ImplicitTexture, shown: Shown) -> Value:
+def _at_nodes(picture: Picture, layer: Layer, texture: ImplicitTexture, shown: Shown) -> Value:
     """Features float32 [N, D] of a layer with node sampling: TEX-20 to TEX-23."""
     graph, parts = shown.points.graph, []
-    image = layer.image
-    assert image is not None, "a layer of no image has no canvas"
     if layer.sampling != node_sampling.GLOBAL:
         assert layer.mesh is not None, "local features need a mesh"
         assert shown.face is not None
         assert shown.weights is not None
         refined = layer.mesh.refined
-        features = node_sampling._at(texture, layer.box, refined.nodes / (1 << FRACTION_BITS))
+        features = node_sampling.at(texture, layer.box, refined.nodes / (1 << FRACTION_BITS))
         corners = graph.constant(features[refined.faces]).take(shown.face)  # [N, 3, D]
         parts.append((corners * shown.weights.reshape(0, -1, 1)).reduced("Sum", 1))
     if layer.sampling != node_sampling.LOCAL:
-        anchors = node_sampling.anchors(layer.boundary, (image.width, image.height))
-        features = node_sampling._at(texture, layer.box, anchors)
+        anchors = node_sampling.anchors(layer.boundary, picture.size)
+        features = node_sampling.at(texture, layer.box, anchors)
         away = [shown.points.take(np.array([k]), 1) - anchors[:, k] for k in (0, 1)]  # [N, S]
         shares = 1 / (away[0] * away[0] + away[1] * away[1]).maximum(node_sampling.NEAR)
         total = shares.reduced("Sum", 1).reshape(-1, 1)
@@ -114,9 +118,8 @@ def _at_nodes(layer: Layer, texture: ImplicitTexture, shown: Shown) -> Value:
     return graph.concat(parts, 1).astype(np.float32)
 
 
-def _sampled(layer: Layer, texture: PyramidTexture, points: Value) -> Value:
+def _sampled(layer: Layer, texture: PyramidTexture, padded: Floats, points: Value) -> Value:
     """Cubic convolution of a raster, float32 [N, channels], not clamped: PYR-43."""
-    padded = texture._padded(layer.apart)
     stride = padded.shape[1]
     table = np.rint(padded.reshape(-1, padded.shape[2]) * SAMPLE_ONE).astype(np.uint16)
     columns, across = _taps(points, 0, layer.box[0], layer.box[2], texture.part[2])

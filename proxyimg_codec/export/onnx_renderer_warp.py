@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..geometry.pose import inverse
 from ..geometry.warp import Warp
-from ..image import Layer
+from ..model import Layer
 from .onnx_graph import Value
 
 NEAR = 2.0**-26

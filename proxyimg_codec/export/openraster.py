@@ -16,17 +16,19 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from ..image import Image
 from ..io import xml
 from ..io.raster import encode_png
 from ..limits import DEFAULT_LIMITS, Limits
+from ..model import Layer, Pictured
+from ..render.cache import Cache
+from ..render.pixels import render
 from .common import at_full_opacity, chosen_layers, opacity_text, region_of
 
 THUMBNAIL_SIDE = 256
 
 
 def build(
-    image: Image,
+    image: Pictured,
     *,
     layers: Sequence[str | int] | None = None,
     background: bool = True,
@@ -45,7 +47,7 @@ def build(
         layers: Names or positions of the layers to write; all by default.
         background: Whether to write the back layer of an opaque picture.
         dtype: uint8 or uint16 samples.
-        engine: As in `Image.render`.
+        engine: As in `render.pixels.render`.
         limits: Bounds each rendering.
         progress: Called with 1 after each layer.
 
@@ -53,37 +55,33 @@ def build(
         UsageError: An unknown layer, none at all, or another `dtype`.
         LimitError: The canvas is too large.
     """
-    chosen = chosen_layers(image, layers, background)
-    icc = {k: v for k, v in image.blocks.items() if k == "icc"}
+    picture = image.picture
+    chosen = chosen_layers(picture, layers, background)
+    icc = {k: v for k, v in picture.blocks.items() if k == "icc"}
+    draw = partial(render, engine=engine, limits=limits, cache=Cache())
+    width, height = picture.size
     parts = {"mimetype": b"image/openraster"}
-    size = {"w": str(image.width), "h": str(image.height)}
-    root = ElementTree.Element("image", {"version": "0.0.5", **size, "xres": "72", "yres": "72"})
+    size = {"w": str(width), "h": str(height), "xres": "72", "yres": "72"}
+    root = ElementTree.Element("image", {"version": "0.0.5", **size})
     stack = ElementTree.SubElement(root, "stack")
-    full = at_full_opacity(image)
+    full = at_full_opacity(picture)
     for k, layer in reversed(list(enumerate(chosen))):
-        region = region_of(image, layer)
-        pixels = full.render(
-            layers=[layer.name], region=region, dtype=dtype, engine=engine, limits=limits
-        )
-        pixels, x, y = _cropped(pixels)
+        region = region_of(picture, layer)
+        pixels, x, y = _cropped(draw(full, layers=[layer.name], region=region, dtype=dtype))
         source = f"data/layer{k}.png"
         parts[source] = encode_png(pixels, icc)
-        attributes = {
-            "name": xml.text(layer.name),
-            "src": source,
-            "x": str(region[0] + x),
-            "y": str(region[1] + y),
-            "opacity": opacity_text(layer),
-            "visibility": "hidden" if layer.pose.hidden else "visible",
-            "composite-op": "svg:src-over",
-        }
+        attributes = _attributes(layer, source, region[0] + x, region[1] + y)
         ElementTree.SubElement(stack, "layer", attributes)
         if progress:
             progress(1)
     parts["stack.xml"] = xml.serialize(root)
     shown = [layer.name for layer in chosen if not layer.pose.hidden]
-    width, height = image.width, image.height
-    flat = partial(_flat, image, shown, engine=engine, limits=limits)
+
+    def flat(width: int, height: int, dtype: Any) -> NDArray[Any]:
+        if not shown:
+            return np.zeros((height, width, 4), dtype)
+        return draw(picture, layers=shown, width=width, height=height, dtype=dtype)
+
     parts["mergedimage.png"] = encode_png(flat(width, height, dtype), icc)
     shrink = min(1.0, THUMBNAIL_SIDE / max(width, height))
     small = flat(max(round(width * shrink), 1), max(round(height * shrink), 1), np.uint8)
@@ -91,13 +89,17 @@ def build(
     return _zipped(parts)
 
 
-def _flat(
-    image: Image, shown: list[str], width: int, height: int, dtype: Any, **options: Any
-) -> NDArray[Any]:
-    """The layers `shown` together; nothing at all if there are none."""
-    if not shown:
-        return np.zeros((height, width, 4), dtype)
-    return image.render(layers=shown, width=width, height=height, dtype=dtype, **options)
+def _attributes(layer: Layer, source: str, x: int, y: int) -> dict[str, str]:
+    """What stack.xml says of a layer whose pixels lie at x, y."""
+    return {
+        "name": xml.text(layer.name),
+        "src": source,
+        "x": str(x),
+        "y": str(y),
+        "opacity": opacity_text(layer),
+        "visibility": "hidden" if layer.pose.hidden else "visible",
+        "composite-op": "svg:src-over",
+    }
 
 
 def _cropped(pixels: NDArray[Any]) -> tuple[NDArray[Any], int, int]:

@@ -11,8 +11,11 @@ from numpy.typing import NDArray
 
 from ..geometry.boundary import Boundary
 from ..geometry.pose import OPACITY_MAX
-from ..image import Image, Layer
 from ..io import xml
+from ..model import Layer, Picture, Pictured
+from ..render.cache import Cache
+from ..render.neighbours import present_outline
+from ..render.pixels import render
 from .common import at_full_opacity, chosen_layers, opacity_text, region_of
 
 NAMESPACE = "http://www.w3.org/2000/svg"
@@ -23,7 +26,7 @@ SWATCH = 64
 
 
 def build(
-    image: Image,
+    image: Pictured,
     *,
     layers: Sequence[str | int] | None = None,
     background: bool = True,
@@ -39,29 +42,30 @@ def build(
         image: The picture.
         layers: Names or positions of the layers to write; all by default.
         background: Whether to write the back layer of an opaque picture.
-        engine: As in `Image.render`.
+        engine: As in `render.pixels.render`.
 
     Raises:
         UsageError: An unknown layer, or none at all.
     """
-    size = {"width": str(image.width), "height": str(image.height)}
+    picture = image.picture
+    size = {"width": str(picture.width), "height": str(picture.height)}
     root = ElementTree.Element(
         "svg",
         {
             "xmlns": NAMESPACE,
             "xmlns:inkscape": INKSCAPE,
             **size,
-            "viewBox": f"0 0 {image.width} {image.height}",
+            "viewBox": f"0 0 {picture.width} {picture.height}",
         },
     )
-    full = at_full_opacity(image)
-    ids = dict(zip(image.layers, identifiers([v.name for v in image.layers]), strict=True))
-    for layer in chosen_layers(image, layers, background):
-        outline = layer.outline
+    full, cache = at_full_opacity(picture), Cache()
+    ids = dict(zip(picture.layers, identifiers([v.name for v in picture.layers]), strict=True))
+    for layer in chosen_layers(picture, layers, background):
+        outline = present_outline(picture, layer)
         shape = ElementTree.SubElement(root, "rect" if outline is None else "path")
         shape.set("id", ids[layer])
         shape.set("inkscape:label", xml.text(layer.name))
-        shape.set("fill", _mean_colour(full, layer, engine))
+        shape.set("fill", _mean_colour(full, layer, engine, cache))
         if layer.pose.opacity < OPACITY_MAX:
             shape.set("opacity", opacity_text(layer))
         if layer.pose.hidden:
@@ -103,13 +107,13 @@ def _decimal(value: int, unit: int) -> str:
     return whole.rstrip("0").rstrip(".") if "." in whole else whole
 
 
-def _mean_colour(image: Image, layer: Layer, engine: str) -> str:
+def _mean_colour(picture: Picture, layer: Layer, engine: str, cache: Cache) -> str:
     """The mean colour of a layer's pixels, ``#rrggbb``; black if it has none on the canvas."""
-    region = region_of(image, layer)
+    region = region_of(picture, layer)
     width, height = (min(n, SWATCH) for n in region[2:])
-    pixels: NDArray[np.float32] = image.render(
-        layers=[layer.name], region=region, width=width, height=height, dtype=np.float32,
-        engine=engine,
+    pixels: NDArray[np.float32] = render(
+        picture, layers=[layer.name], region=region, width=width, height=height, dtype=np.float32,
+        engine=engine, cache=cache,
     )  # fmt: skip
     alpha = pixels[..., 3:] if pixels.shape[2] == 4 else np.ones_like(pixels[..., :1])
     mean = (pixels[..., :3] * alpha).sum((0, 1)) / max(float(alpha.sum()), 1e-6)

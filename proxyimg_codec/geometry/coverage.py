@@ -13,7 +13,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from ..limits import DEFAULT_LIMITS, Limits
+from ..limits import Budget
 from ..native import kernel
 
 Ints = NDArray[np.int64]
@@ -100,7 +100,7 @@ def coverage(
     y0: int,
     width: int,
     height: int,
-    limits: Limits = DEFAULT_LIMITS,
+    budget: Budget | None = None,
 ) -> NDArray[np.int32]:
     """Coverage [height, width], 0..FULL, of the output pixels from column x0 and row y0 on.
 
@@ -110,11 +110,12 @@ def coverage(
         y0: First row.
         width: Columns.
         height: Rows.
-        limits: Bounds the edges and their pieces.
+        budget: Bounds the edges and their pieces.
 
     Raises:
         LimitError: There are too many.
     """
+    budget = budget or Budget()
     corner = np.array([x0 * ONE, y0 * ONE])
     segments = np.concatenate([np.zeros((0, 4, 2), np.int64), *map(_segments, paths)]) - corner
     # What lies above, below or to the right leaves no trace here.
@@ -123,25 +124,25 @@ def coverage(
     segments = segments[near]
     log2 = _log2_chords(segments)
     if kernel.available():
-        limits.spend("work", int((1 << log2).sum()))
-        out, work = kernel.coverage(segments, log2, width, height, limits.left("work"))
-        limits.spend("work", work)
+        budget.spend("work", int((1 << log2).sum()))
+        out, work = kernel.coverage(segments, log2, width, height, budget.left("work"))
+        budget.spend("work", work)
         return out
     cells = np.zeros(height * (width + 2), np.int64)
-    for some in _batches(1 << log2, 1 << MAX_LOG2_CHORDS, limits):
+    for some in _batches(1 << log2, 1 << MAX_LOG2_CHORDS, budget):
         start, end = _chords(segments[some], log2[some])
-        for at in _batches(np.abs(end[:, 1] - start[:, 1]) // ONE + 2, height + 1, limits):
+        for at in _batches(np.abs(end[:, 1] - start[:, 1]) // ONE + 2, height + 1, budget):
             row, x_in, x_out, dy = _split_rows(start[at], end[at], height)
-            for part in _batches(np.abs(x_out - x_in) // ONE + 2, width + 1, limits):
+            for part in _batches(np.abs(x_out - x_in) // ONE + 2, width + 1, budget):
                 _accumulate(cells, row[part], x_in[part], x_out[part], dy[part], width)
     total = np.cumsum(cells.reshape(height, width + 2), axis=1)[:, 1 : width + 1]
     return np.minimum(np.abs(total), FULL).astype(np.int32)
 
 
-def _batches(pieces: Ints, most: int, limits: Limits) -> Iterator[slice]:
+def _batches(pieces: Ints, most: int, budget: Budget) -> Iterator[slice]:
     """Slices of items that together make about `PIECES` pieces; an item makes at most `most`."""
     total = np.cumsum(np.minimum(pieces, most))
-    limits.spend("work", int(total[-1]) if len(total) else 0)
+    budget.spend("work", int(total[-1]) if len(total) else 0)
     start = 0
     while start < len(pieces):
         done = int(total[start - 1]) if start else 0

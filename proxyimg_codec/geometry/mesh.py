@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..entropy import arrays
 from ..errors import FormatError
-from ..limits import DEFAULT_LIMITS, Limits
+from ..limits import Budget
 from . import deltas
 
 Ints = NDArray[np.int64]
@@ -90,11 +90,11 @@ class Mesh:
         self,
         fields: Mapping[str, Any],
         where: str = "chunk MESH",
-        limits: Limits = DEFAULT_LIMITS,
+        budget: Budget | None = None,
     ) -> None:
         self.fields = fields
         self._where = where
-        self._limits = limits
+        self._budget = budget or Budget()
 
     @staticmethod
     def build(base: Base) -> Mesh:
@@ -144,7 +144,7 @@ class Mesh:
             end = at + 4 + int.from_bytes(data[at : at + 4], "little")
             if end > len(data) or count == 0:
                 raise FormatError("split flags are truncated", self._where, rule="MSH-11")
-            self._limits.spend("faces", 4 * count)
+            self._budget.spend("faces", 4 * count)
             values = arrays.decode(data[at + 4 : end], (1, 1, count), 1, np.ones((1, count), bool))
             flags.append(values[0, 0] > 0)
             count, at = 4 * int(flags[-1].sum()), end

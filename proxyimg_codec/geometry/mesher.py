@@ -10,9 +10,27 @@ from numpy.typing import NDArray
 from . import coverage as cover
 from .boundary import Boundary
 from .delaunay import triangulate
-from .mesh import Base
+from .mesh import Base, Mesh
 from .outline import CELLS, Outline, outline
 from .polygons import touching, winding
+
+EDGE_FRONT, EDGE_BACK = 0.05, 0.2
+"""Edge lengths of meshes relative to the diagonal of a layer (ProxyImg, l_r^f and l_r^b)."""
+
+
+def derived(boundary: Boundary | None, size: tuple[int, int], edge: float | None = None) -> Mesh:
+    """A mesh for a layer whose file has none, as `delaunay` makes it.
+
+    Args:
+        boundary: The layer's; None is the whole canvas.
+        size: Width and height of the canvas in pixels.
+        edge: Length of edges as in `delaunay`; None = what suits edits.
+
+    Raises:
+        UsageError: `edge` is out of range.
+    """
+    suits = EDGE_BACK if boundary is None else EDGE_FRONT
+    return Mesh.build(delaunay(boundary, size, suits if edge is None else edge))
 
 
 def delaunay(boundary: Boundary | None, size: tuple[int, int], edge: float) -> Base:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ..limits import DEFAULT_LIMITS, SAMPLE_COST_BITS, Limits
+from ..limits import SAMPLE_COST_BITS, Budget
 
 Floats = NDArray[np.float64]
 
@@ -16,7 +16,7 @@ BATCH = 1 << 21
 
 
 def rasterize(
-    corners: Floats, x0: int, y0: int, width: int, height: int, limits: Limits = DEFAULT_LIMITS
+    corners: Floats, x0: int, y0: int, width: int, height: int, budget: Budget | None = None
 ) -> NDArray[np.int32]:
     """The triangle [height, width] that holds the centre of each sample, or -1.
 
@@ -29,11 +29,12 @@ def rasterize(
         y0: First row.
         width: Columns.
         height: Rows.
-        limits: Bounds how often samples may be covered.
+        budget: Bounds how often samples may be covered.
 
     Raises:
         LimitError: The triangles cover the grid too often.
     """
+    budget = budget or Budget()
     out = np.full(height * width, -1, np.int32)
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
@@ -47,9 +48,9 @@ def rasterize(
         count = np.maximum(last - first, 0)
         # Rows count too, less one a triangle: narrow triangles cost work and cover nothing.
         spent = int(count.sum()) + max(len(row) - len(order[part]), 0)
-        limits.spend("multiply_adds", spent + len(corners) << SAMPLE_COST_BITS)
+        budget.spend("multiply_adds", spent + len(corners) << SAMPLE_COST_BITS)
         covered += spent
-        limits.check("overlap", covered // out.size)
+        budget.check("overlap", covered // out.size)
         for some in _batches(count):
             span = np.repeat(np.arange(some.start, some.stop), count[some])
             ends = np.cumsum(count[some])

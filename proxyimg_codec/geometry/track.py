@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FormatError, UsageError
-from ..limits import DEFAULT_LIMITS, Limits
+from ..limits import Budget
 from . import deltas
 from .mesh import FRACTION_BITS, Refined
 from .pose import POINT_MAX, residuals, restored
@@ -144,14 +144,14 @@ Coded = tuple[bytes, bytes]
 """Classes and deltas of an array of signed integers."""
 
 
-def check_size(limits: Limits, modes: int, coefficients: int, nodes: int = 0) -> None:
+def check_size(budget: Budget, modes: int, coefficients: int, nodes: int = 0) -> None:
     """Checks what tracks cost: all coefficients of a mode, and all nodes of the layers that move.
 
     Raises:
-        LimitError: That exceeds `limits`.
+        LimitError: That exceeds `budget`.
     """
-    limits.spend("wavefronts", coefficients + 2 + nodes + 2 * modes)
-    limits.spend("motion", modes * (coefficients + 2 * nodes))
+    budget.spend("wavefronts", coefficients + 2 + nodes + 2 * modes)
+    budget.spend("motion", modes * (coefficients + 2 * nodes))
 
 
 def encode(tracks: list[tuple[Track, Refined]]) -> tuple[Coded, Coded]:
@@ -162,7 +162,7 @@ def encode(tracks: list[tuple[Track, Refined]]) -> tuple[Coded, Coded]:
     """
     coefficients = sum(track.curves.shape[1] for track, _ in tracks)
     nodes = sum(len(refined.nodes) for _, refined in tracks)
-    check_size(DEFAULT_LIMITS, len(tracks[0][0].curves), coefficients, nodes)
+    check_size(Budget(), len(tracks[0][0].curves), coefficients, nodes)
     curves, shapes = [], []
     for track, refined in tracks:
         curves.append(np.diff(track.curves, axis=1, prepend=0))
@@ -174,17 +174,17 @@ def encode(tracks: list[tuple[Track, Refined]]) -> tuple[Coded, Coded]:
 
 def decode(
     curves: Coded, shapes: Coded, modes: int, timeline: Timeline, meshes: list[Refined], where: str,
-    limits: Limits = DEFAULT_LIMITS,
+    budget: Budget | None = None,
 ) -> list[Track]:  # fmt: skip
     """Inverse of `encode`.
 
     Raises:
         FormatError: Corrupt streams, or a number that is out of range.
-        LimitError: They exceed `limits`.
+        LimitError: They exceed `budget`.
     """
     coefficients = len(meshes) * timeline.coefficients
     nodes = [len(m.nodes) for m in meshes]
-    check_size(limits, modes, coefficients, sum(nodes))
+    check_size(budget or Budget(), modes, coefficients, sum(nodes))
     steps = deltas.decode(*curves, modes, coefficients, where)
     whole = deltas.decode(*shapes, 2, sum(nodes), where, modes).reshape(2, modes, -1)
     tracks = []

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..limits import DEFAULT_LIMITS, Limits
+from ..limits import Budget
 from .boundary import Boundary
 from .mesh import FRACTION_BITS, Mesh
 from .pose import NODE_BITS, Pose, inverse
@@ -123,7 +123,7 @@ def divide(path: Ints) -> Ints:
 
 
 def barycentric(
-    points: Ints, nodes: Ints, faces: NDArray[np.int32], limits: Limits = DEFAULT_LIMITS
+    points: Ints, nodes: Ints, faces: NDArray[np.int32], budget: Budget | None = None
 ) -> tuple[NDArray[np.int64], Ints]:
     """The face [n] that holds each point, and its weights [n, 3] in 2**-16, in integers.
 
@@ -141,7 +141,8 @@ def barycentric(
     corners = grid[faces]  # [F, 3, 2]
     first, last = corners.min(1), corners.max(1)
     face = np.full(len(points), -1, np.int64)
-    limits.check("beyond", -(-len(points) // RUN) * len(faces))
+    budget = budget or Budget()
+    budget.check("beyond", -(-len(points) // RUN) * len(faces))
     for start in range(0, len(points), RUN):
         part = at[start : start + RUN]
         near = np.flatnonzero(
@@ -154,7 +155,7 @@ def barycentric(
             found = near[inside.argmax(1)]
             face[start : start + RUN] = np.where(inside.any(1), found, -1)
     lost = np.flatnonzero(face < 0)
-    limits.check("beyond", len(lost) * len(faces))
+    budget.check("beyond", len(lost) * len(faces))
     face[lost] = nearest(3 * at[lost], corners.sum(1))
     a, b, c = (corners[face, i] for i in range(3))
     area = np.maximum(_side(a, b, c), 1)
@@ -205,7 +206,7 @@ class Warp:
         pose: The layer's.
         mesh: Its mesh; consulted if the pose is bent or `meshed`.
         meshed: Whether faces are wanted in any case, and weights too.
-        limits: Bounds how often samples may be covered, and how many may lie beyond the mesh.
+        budget: Bounds how often samples may be covered, and how many may lie beyond the mesh.
     """
 
     def __init__(
@@ -213,9 +214,9 @@ class Warp:
         pose: Pose,
         mesh: Mesh | None,
         meshed: bool = False,
-        limits: Limits = DEFAULT_LIMITS,
+        budget: Budget | None = None,
     ) -> None:
-        self._pose, self._limits = pose, limits.budget()
+        self._pose, self._budget = pose, budget or Budget()
         self._mesh = mesh if pose.bent or meshed else None
         if self._mesh is None:
             return
@@ -266,7 +267,7 @@ class Warp:
         """
         corners = (self._corners - origin) * scale
         # Of a mirrored layer the faces that show are those that showed before.
-        return rasterize(corners[:, ::-1] if self._pose.mirrored else corners, *box, self._limits)
+        return rasterize(corners[:, ::-1] if self._pose.mirrored else corners, *box, self._budget)
 
     def locate(self, x: Floats, y: Floats, face: NDArray[np.int32] | None = None) -> Located:
         """Texture points of canvas points x, y [n], whose faces [n] are given if `meshed`."""
@@ -281,7 +282,7 @@ class Warp:
         at = face.astype(np.int64)
         lost = np.flatnonzero(at < 0)
         points = np.stack([x, y], axis=1) if len(lost) or self._weighing else np.empty((0, 2))
-        self._limits.spend("beyond", len(lost) * len(self._centres))
+        self._budget.spend("beyond", len(lost) * len(self._centres))
         at[lost] = nearest(points[lost], self._centres)
         start_x, x_by_x, x_by_y, start_y, y_by_x, y_by_y = (v.take(at) for v in self._away)
         shown_x = x + (start_x + x_by_x * x + x_by_y * y)

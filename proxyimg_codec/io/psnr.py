@@ -1,29 +1,11 @@
-"""How close a decoded picture is to its original."""
+"""How close two pictures are."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-from ..image import Image
-
-
-def psnr(original: NDArray[Any], image: Image) -> float | None:
-    """PSNR in dB of the decoded 8-bit picture, or None if it is exact.
-
-    Opaque pictures are compared in RGB; others in premultiplied RGBA, so that the colour of
-    invisible pixels does not count.
-    """
-    from ..encoder.encode import to_float
-
-    return psnr_8bit(_eight_bit(to_float(original)[0]), image.render())
-
-
-def _eight_bit(picture: NDArray[np.float32]) -> NDArray[np.uint8]:
-    return np.rint(picture * 255).astype(np.uint8)
 
 
 def psnr_8bit(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> float | None:

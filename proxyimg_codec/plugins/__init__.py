@@ -6,8 +6,9 @@ A package offers a part as an entry point in the group ``proxyimg_codec.KIND``:
     mine = "my_package:segment"
 
 Kinds:
-    segmenters: `(rgb, max_layers, support) -> list[Region]`, as `encoder.segment.segment`.
+    segmenters: `(rgb, max_layers, support) -> list[Region]`, as `encoder.shapes.segment.segment`.
     meshers: `(boundary, size, edge) -> Base`, as `geometry.mesher.delaunay`.
+    engines: `(texture, network, taps) -> float32 [N, channels]`, as `render.engines.run_numpy`.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ BUILT_IN = {
         "triwild": "proxyimg_codec.encoder.shapes.external_meshers:triwild",
         "ftetwild": "proxyimg_codec.encoder.shapes.external_meshers:ftetwild",
     },
+    "engines": {"ort": "proxyimg_codec.export.onnx_engine:run"},
 }
 """Parts of this package: kind, name, and where the object is."""
 

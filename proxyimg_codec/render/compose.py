@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,17 +12,17 @@ from ..geometry.boundary import Boundary
 from ..geometry.mesh import FRACTION_BITS
 from ..geometry.pose import COLOUR_BITS, OPACITY_MAX
 from ..geometry.warp import Located, Warp
-from ..limits import DEFAULT_LIMITS, SAMPLE_COST_BITS, Limits
+from ..limits import DEFAULT_LIMITS, SAMPLE_COST_BITS, Budget, Limits
+from ..model import Layer, Picture
 from ..native import kernel
 from ..texture import node_sampling
 from ..texture.implicit import ImplicitTexture
-from ..texture.network import Floats
+from ..texture.network import Floats, Network
 from ..texture.pyramid import PyramidTexture
-from . import cache, engines
+from . import engines
+from .cache import SAMPLES_MAX, Cache, Sheet
+from .neighbours import moved_neighbours, present_outline
 from .view import View
-
-if TYPE_CHECKING:
-    from ..image import Image, Layer
 
 TILE_SAMPLES = 1 << 16
 """Samples rendered at a time: bounds the memory of any output, and keeps it in the cache."""
@@ -34,32 +33,34 @@ ANCHOR_COST_BITS = 7
 Rectangle = tuple[int, int, int, int]
 
 
-def render(
-    image: Image,
+def compose(
+    picture: Picture,
     view: View,
     layers: Sequence[Layer],
     engine: str,
     out: Callable[[int, int, Floats], None],
     limits: Limits = DEFAULT_LIMITS,
+    cache: Cache | None = None,
 ) -> None:
-    """Renders `layers` (back to front) and hands finished tiles to `out`.
+    """Draws `layers` (back to front) and hands finished tiles to `out`.
 
     Args:
-        image: The picture the layers belong to.
+        picture: What the layers belong to.
         view: Output size and region.
         layers: What to draw.
         engine: Name of who runs the networks.
         out: Called with row, column and float32 [h, w, 4] premultiplied colour and alpha in 0..1.
         limits: Bounds what it costs.
+        cache: Colours that were computed before.
 
     Raises:
         LimitError: It would cost more.
     """
     sx, sy = view.supersampling
-    limits = limits.budget()
+    budget, cache = Budget(limits), cache or Cache()
     samples = view.width * sx * view.height * sy
-    limits.spend("multiply_adds", len(layers) * samples << SAMPLE_COST_BITS)
-    painters = [_Painter(image, layer, view, engine, limits) for layer in reversed(layers)]
+    budget.spend("multiply_adds", len(layers) * samples << SAMPLE_COST_BITS)
+    painters = [_Painter(picture, layer, view, engine, budget, cache) for layer in reversed(layers)]
     tile_w = max(min(view.width, TILE_SAMPLES // (sx * sy)), 1)
     tile_h = max(TILE_SAMPLES // (tile_w * sx * sy), 1)
     for row in range(0, view.height, tile_h):
@@ -97,49 +98,54 @@ def _tile(painters: Sequence[_Painter], box: Rectangle) -> Floats:
 class _Painter:
     """One layer on the sample grid of one view."""
 
-    def __init__(self, image: Image, layer: Layer, view: View, engine: str, limits: Limits) -> None:
-        self._image, self._layer, self._view, self._limits = image, layer, view, limits
+    def __init__(
+        self, picture: Picture, layer: Layer, view: View, engine: str, budget: Budget, cache: Cache
+    ) -> None:
+        self._picture, self._layer, self._view = picture, layer, view
+        self._budget, self._cache = budget, cache
         self._engine = engine
         self._run = engines.find(engine)
         self.native = self._run is engines.run_native
-        self._paths = outline(layer.outline, view)
-        self._warp = Warp(layer.pose, layer.mesh, layer.sampling in (1, 2), limits)
+        self._network = picture.network_of(layer)
+        self._moved = moved_neighbours(picture, layer)
+        self._paths = outline(present_outline(picture, layer), view)
+        self._warp = Warp(layer.pose, layer.mesh, layer.sampling in (1, 2), budget)
         sx, sy = view.supersampling
-        small = view.width * sx * view.height * sy <= cache.SAMPLES_MAX
+        small = view.width * sx * view.height * sy <= SAMPLES_MAX
         # A moment of a motion is drawn once; keeping it would only push out what stays.
         self._caching = small and layer.pose.sway is None
 
-    def sheet(self, box: Rectangle) -> cache.Sheet:
+    def sheet(self, box: Rectangle) -> Sheet:
         """The layer on a rectangle of samples: its coverage, and the colours known so far."""
         key = self._key(box)
-        found = self._image.cache.get(key) if self._caching else None
+        found = self._cache.get(key) if self._caching else None
         if found is None:
             found = self._blank(box)
             if self._caching:
-                self._image.cache.put(key, found)
+                self._cache.put(key, found)
         return found
 
-    def _blank(self, box: Rectangle) -> cache.Sheet:
+    def _blank(self, box: Rectangle) -> Sheet:
         _, _, w, h = box
         if self._paths is None:
-            return cache.Sheet(None, 0, h * w)
-        covered = cover.coverage(self._paths, *box, self._limits)
+            return Sheet(None, 0, h * w)
+        covered = cover.coverage(self._paths, *box, self._budget)
         seen = np.flatnonzero(covered.max(1))  # faster than any(1)
         first, last = (int(seen[0]), int(seen[-1]) + 1) if len(seen) else (0, 0)
         share = covered[first:last].ravel().astype(np.float32) / np.float32(cover.FULL)
-        return cache.Sheet(share, first * w, last * w)
+        return Sheet(share, first * w, last * w)
 
     def _key(self, box: Rectangle) -> Hashable:
         """All that coverage and colour depend on. Models are immutable, so identity will do."""
         layer, pose = self._layer, self._layer.pose
         arrays = tuple(None if v is None else v.tobytes() for v in (pose.nodes, pose.places))
         return (
-            layer.boundary, layer.texture, layer.apart, layer.network, layer.mesh,
+            layer.boundary, layer.texture, self._moved, self._network, layer.mesh,
             layer.box, layer.sampling, pose.matrix, pose.shift, arrays,
             self._view, box, self._engine,
         )  # fmt: skip
 
-    def paint(self, sheet: cache.Sheet, box: Rectangle, at: NDArray[np.int64]) -> None:
+    def paint(self, sheet: Sheet, box: Rectangle, at: NDArray[np.int64]) -> None:
         """Computes the colours of the samples `at` of a sheet."""
         everything = len(at) == len(sheet.known)
         sheet.colour[slice(None) if everything else at] = self._textured(box, at + sheet.start)
@@ -173,16 +179,17 @@ class _Painter:
         texture = layer.texture
         if isinstance(texture, PyramidTexture):
             return premultiplied(
-                texture.sample(shown.x, shown.y, layer.box, layer.apart, self.native)
+                texture.sample(shown.x, shown.y, layer.box, self._moved, self.native)
             )
-        network = self._image.networks[texture.network]
+        network = self._network
+        assert network is not None, "an implicit texture has a network"
         cost = network.shape.parameters
         if layer.sampling in (node_sampling.BOTH, node_sampling.GLOBAL):
             anchors = 4 if layer.boundary is None else sum(layer.boundary.segments)
             cost += anchors * len(texture.steps) << ANCHOR_COST_BITS
-        self._limits.spend("multiply_adds", len(at) * cost)
+        self._budget.spend("multiply_adds", len(at) * cost)
         if layer.sampling:
-            return premultiplied(_at_nodes(self._image, layer, texture, shown))
+            return premultiplied(_at_nodes(self._picture, layer, texture, network, shown))
         taps = texture.taps(shown.x, shown.y, layer.box)
         return premultiplied(self._run(texture, network, taps))
 
@@ -205,21 +212,22 @@ def outline(boundary: Boundary | None, view: View) -> list[NDArray[np.int64]] | 
     ]
 
 
-def _at_nodes(image: Image, layer: Layer, texture: ImplicitTexture, shown: Located) -> Floats:
+def _at_nodes(
+    picture: Picture, layer: Layer, texture: ImplicitTexture, network: Network, shown: Located
+) -> Floats:
     """Network outputs [n, channels] of a layer with node sampling."""
-    size = (image.width, image.height)
     refined = layer.mesh.refined if layer.mesh else None
     nodes = np.zeros((1, 2)) if refined is None else refined.nodes / (1 << FRACTION_BITS)
     faces = np.zeros((1, 3), np.int32) if refined is None else refined.faces
     count = len(shown.x)
     features = node_sampling.features(
         texture, layer.box, layer.sampling, nodes, faces,
-        node_sampling.anchors(layer.boundary, size),
+        node_sampling.anchors(layer.boundary, picture.size),
         np.zeros(count, np.int64) if shown.face is None else shown.face,
         np.zeros((count, 3)) if shown.weights is None else shown.weights,
         np.stack([shown.x, shown.y], axis=1),
     )  # fmt: skip
-    return engines.run_features(image.networks[texture.network], features)
+    return engines.run_features(network, features)
 
 
 def premultiplied(output: Floats) -> Floats:

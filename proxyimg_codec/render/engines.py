@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from .. import plugins
 from ..errors import UnsupportedError, UsageError
 from ..native import kernel
 from ..texture.implicit import ImplicitTexture, Taps
@@ -25,7 +26,7 @@ _CHUNK = 4096
 def run_numpy(texture: ImplicitTexture, network: Network, taps: Taps) -> Floats:
     """Plain numpy."""
     out = np.empty((len(taps.base), network.shape.channels), np.float32)
-    for at, part in _chunks(taps):
+    for at, part in in_chunks(taps):
         out[at] = network(texture.features(part))
     return out
 
@@ -44,17 +45,6 @@ def _flat(network: Network) -> tuple[kernel.Net, Floats]:
     return kernel.Net(s.dim, s.octaves, s.hidden, s.depth, s.channels), np.concatenate(parts)
 
 
-def run_ort(texture: ImplicitTexture, network: Network, taps: Taps) -> Floats:
-    """ONNX Runtime runs the network on features gathered by numpy."""
-    from ..export.onnx_network import session
-
-    run = session(network)
-    out = np.empty((len(taps.base), network.shape.channels), np.float32)
-    for at, part in _chunks(taps):
-        out[at] = run(texture.features(part))
-    return out
-
-
 def run_features(network: Network, features: Floats) -> Floats:
     """Outputs [N, channels] for features [N, D] that do not come from taps, in plain numpy."""
     out = np.empty((len(features), network.shape.channels), np.float32)
@@ -64,13 +54,15 @@ def run_features(network: Network, features: Floats) -> Floats:
     return out
 
 
-def _chunks(taps: Taps) -> Iterator[tuple[slice, Taps]]:
+def in_chunks(taps: Taps) -> Iterator[tuple[slice, Taps]]:
+    """Parts of taps that are run at a time, and where in the output they belong."""
     for i in range(0, len(taps.base), _CHUNK):
         at = slice(i, i + _CHUNK)
         yield at, Taps(taps.base[at], taps.fx[at], taps.fy[at], taps.stride)
 
 
-ENGINES: dict[str, Engine] = {"numpy": run_numpy, "native": run_native, "ort": run_ort}
+BUILT_IN: dict[str, Engine] = {"numpy": run_numpy, "native": run_native}
+"""Engines that need nothing else; others are plug-ins (`plugins`)."""
 
 
 def find(name: str) -> Engine:
@@ -82,16 +74,12 @@ def find(name: str) -> Engine:
     """
     if name == "auto":
         name = "native" if kernel.available() else "numpy"
-    if name not in ENGINES:
-        raise UsageError(f"engine {name!r} is unknown; choose auto, {', '.join(ENGINES)}")
     if name == "native" and not kernel.available():
         raise UnsupportedError("engine native: the kernel was not compiled at installation")
-    if name == "ort":
-        try:
-            import onnx  # noqa: F401
-            import onnxruntime  # noqa: F401
-        except ImportError:
-            raise UnsupportedError(
-                "engine ort needs onnxruntime and onnx: pip install 'proxyimg-codec[ort]'"
-            ) from None
-    return ENGINES[name]
+    if name in BUILT_IN:
+        return BUILT_IN[name]
+    known = [*BUILT_IN, *plugins.names("engines")]
+    if name not in known:
+        raise UsageError(f"engine {name!r} is unknown; choose auto, {', '.join(known)}")
+    engine: Engine = plugins.find("engines", name)
+    return engine

@@ -75,9 +75,9 @@ def features(
     """
     dim, parts = len(texture.steps), []
     if sampling != GLOBAL:
-        parts.append(_at(texture, box, nodes))
+        parts.append(at(texture, box, nodes))
     if sampling != LOCAL:
-        parts.append(_at(texture, box, anchors))
+        parts.append(at(texture, box, anchors))
     out = np.empty((len(points), dim * len(parts)), np.float32)
     for start in range(0, len(points), CHUNK):
         part = slice(start, start + CHUNK)
@@ -88,7 +88,7 @@ def features(
     return out
 
 
-def _at(texture: ImplicitTexture, box: Box, points: Reals) -> Reals:
+def at(texture: ImplicitTexture, box: Box, points: Reals) -> Reals:
     """The plane sampled at points [N, 2]: [N, D]."""
     return texture.features(texture.taps(points[:, 0], points[:, 1], box)).astype(np.float64)
 

@@ -19,10 +19,10 @@ from ..container import texr
 from ..entropy import arrays
 from ..errors import FormatError
 from ..native import kernel
-from .cuts import NOTHING, Apart, Cuts, Samples
 from .diffusion import FRACTION_BITS, diffused
 from .implicit import Box, ImplicitTexture
 from .network import Floats, Network
+from .occlusion import ALL_IN_PLACE, Moved, Occlusion, Samples
 from .planes import Planes
 
 FILL_ONE = 255 << FRACTION_BITS
@@ -55,7 +55,7 @@ class PyramidTexture:
     part: Box
     cell: int = 0
     mask: NDArray[np.bool_] | None = None
-    cuts: Cuts | None = None
+    cuts: Occlusion | None = None
     network: ClassVar[None] = None
 
     @property
@@ -79,11 +79,11 @@ class PyramidTexture:
             return b""
         return arrays.encode(self.mask[None].astype(np.int64), 1, np.ones(self.mask.shape, bool))
 
-    def masked(self, apart: Apart, cuts: Cuts | None = None) -> PyramidTexture:
-        """This view with a mask, of 2x2 samples that `Cuts.kept` all keeps, and with other cuts."""
+    def masked(self, moved: Moved, cuts: Occlusion | None = None) -> PyramidTexture:
+        """This view with other cuts, and a mask of 2x2 samples: those that all are kept."""
         if self.cuts is None:
             return self
-        kept = self.cuts.kept(apart)
+        kept = self.cuts.kept(moved)
         height, width = kept.shape
         whole = np.pad(kept, ((0, height % 2), (0, width % 2)), mode="edge")
         corners = [whole[j::2, i::2] for j in (0, 1) for i in (0, 1)]
@@ -120,9 +120,9 @@ class PyramidTexture:
             return None
         return None if shown.all() else shown
 
-    def kept(self, apart: Apart) -> Samples | None:
-        """Those of `shown` that still fit once something is apart; None = all."""
-        return self.shown if self.cuts is None or apart == NOTHING else self.cuts.kept(apart)
+    def kept(self, moved: Moved) -> Samples | None:
+        """Those of `shown` that still fit once something has moved; None = all."""
+        return self.shown if self.cuts is None or moved == ALL_IN_PLACE else self.cuts.kept(moved)
 
     @cached_property
     def filled(self) -> NDArray[np.uint16]:
@@ -145,7 +145,7 @@ class PyramidTexture:
         x: NDArray[np.float64],
         y: NDArray[np.float64],
         box: Box,
-        apart: Apart = NOTHING,
+        moved: Moved = ALL_IN_PLACE,
         native: bool = False,
     ) -> Floats:
         """Colours [N, `channels`] at canvas points x, y [N], premultiplied, not clamped.
@@ -157,7 +157,7 @@ class PyramidTexture:
             x: Canvas x of the points.
             y: Canvas y.
             box: The layer's rectangle.
-            apart: What `cuts` have lost.
+            moved: What `cuts` have lost.
             native: Whether to use the compiled kernel.
 
         Raises:
@@ -166,8 +166,8 @@ class PyramidTexture:
         column, fx = _position(x, box[0], box[2], self.part[2])
         row, fy = _position(y, box[1], box[3], self.part[3])
         if not (fx.any() or fy.any()):
-            return self._samples(row, column, self.kept(apart))
-        padded = self._padded(apart)
+            return self._samples(row, column, self.kept(moved))
+        padded = self.padded(moved)
         first = row * padded.shape[1] + column
         if native:
             return kernel.sample(padded, first.astype(np.int32), fx, fy)
@@ -177,25 +177,25 @@ class PyramidTexture:
             out[at] = _interpolated(padded, first[at], fx[at], fy[at])
         return out
 
-    def _padded(self, apart: Apart) -> Floats:
+    def padded(self, moved: Moved) -> Floats:
         """All premultiplied samples, with the edge repeated once before and twice behind."""
-        found = self._last.get(apart)
+        found = self._last.get(moved)
         if found is None:
             _, _, width, height = self.part
             rows, columns = (
                 np.clip(np.arange(-1, n + 2), 0, n - 1).astype(np.intp) for n in (height, width)
             )
-            kept = self.kept(apart)
+            kept = self.kept(moved)
             found = np.empty((len(rows), len(columns), self.channels(())), np.float32)
             for row, out in zip(rows, found, strict=True):
                 out[:] = self._samples(np.full_like(columns, row), columns, kept)
-            # What is apart stays so while layers move: the last one is enough.
+            # What has moved stays the same while a layer is dragged: the last one is enough.
             self._last.clear()
-            self._last[apart] = found
+            self._last[moved] = found
         return found
 
     @cached_property
-    def _last(self) -> dict[Apart, Floats]:
+    def _last(self) -> dict[Moved, Floats]:
         return {}
 
     def _samples(
@@ -273,7 +273,7 @@ def unpack(
     fields: Mapping[str, Any],
     planes: Sequence[Planes],
     where: str = "chunk TEXR",
-    cuts: Cuts | None = None,
+    cuts: Occlusion | None = None,
 ) -> PyramidTexture:
     """Inverse of `PyramidTexture.fields`; `planes` are those of the file.
 

@@ -1,7 +1,7 @@
 """Checks a file completely: every chunk, every stream, and what is odd without being wrong.
 
 Errors have the id of the broken statement of the specification; what is odd has codes of its own
-(`doubts`). An error stops the check of its chunk, and of what cannot be understood without it.
+(`warnings`). An error stops the check of its chunk, and of what cannot be understood without it.
 """
 
 from __future__ import annotations
@@ -9,24 +9,24 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import asdict
 from functools import partial
 from math import inf, prod
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..codec import pack
+from ..codec import unpack
 from ..codec.levels import Usage, profile, refined
 from ..container import file, layr, mesh, meta, motn, netw, plan, pose, texr, undo
 from ..container.chunks import Chunk, read, read_damaged
-from ..container.file import Container, Values
+from ..container.content import Container, Values
 from ..errors import FormatError, LimitError, PxiError, UnsupportedError
 from ..geometry import boundary, warp
 from ..geometry import pose as poses
 from ..geometry.mesh import Mesh
-from ..image import Image, Layer
-from ..limits import DEFAULT_LIMITS, Limits
+from ..limits import DEFAULT_LIMITS, Budget, Limits
+from ..model import Layer, Picture
+from ..render.neighbours import present_outline
 from ..texture import implicit, network, planes, pyramid
 from . import warnings
 from .warnings import ERROR, Issue
@@ -91,7 +91,7 @@ class _Check:
     def __init__(self, limits: Limits) -> None:
         self.issues: list[Issue] = []
         self.profile: str | None = None
-        self.usage = Usage(**asdict(limits))
+        self.usage = Usage(limits)
         self._limits = limits
         self._offsets: dict[tuple[str, int], int | None] = {}
         # What chunks of the file and its history hold, and what that decodes to, by identity.
@@ -141,7 +141,7 @@ class _Check:
         chunks: list[Chunk] = []
         wrong: dict[int, FormatError] = {}
         with suppress(*_REFUSED):
-            chunks, cut = read_damaged(data, self._limits)
+            chunks, cut = read_damaged(data, Budget(self._limits))
             for k in cut:
                 wrong[k] = FormatError("CRC mismatch: the file is damaged", rule="CON-6")
                 if cut[k]:
@@ -191,14 +191,14 @@ class _Check:
         if file.fields_of(chunk):
             self._values_of(chunk)
         if chunk.type in meta.BLOCKS.values():
-            meta.decompress(chunk, "", self._limits)
+            meta.decompress(chunk, "", Budget(self._limits))
         if chunk.type == undo.TYPE:
             present = [c for c in chunks if c.type not in (undo.TYPE, _END.type)]
-            undo.decode(chunk, present, "", self._limits)
+            undo.decode(chunk, present, "", Budget(self._limits))
             state = undo.digest(present, chunk.old)
             if self._intact and self._values_of(chunk)["state"] != state:
                 self.issues.append(
-                    warnings.doubt("VAL-2", "it is ignored", undo.TYPE, chunk.offset)
+                    warnings.warning("VAL-2", "it is ignored", undo.TYPE, chunk.offset)
                 )
         return True
 
@@ -219,11 +219,11 @@ class _Check:
 
     def _streams(self, c: Container) -> None:
         """Decodes all streams of a container."""
-        limits = self._limits.budget()
+        budget = Budget(self._limits)
         for i, v in enumerate(c.layers):
             self._once(layr.TYPE, i, sum(v["segments"]), partial(boundary.decode, v, ""), v)
         meshes = {
-            v["layer"]: self._once(mesh.TYPE, i, v["gates"] << 6, partial(_mesh, v, limits), v)
+            v["layer"]: self._once(mesh.TYPE, i, v["gates"] << 6, partial(_mesh, v, budget), v)
             for i, v in enumerate(c.meshes)
         }
         for i, v in enumerate(c.poses):
@@ -251,7 +251,7 @@ class _Check:
             if all(m is not None for m in moving):
                 nodes = sum(len(m.refined.nodes) for m in moving)
                 cost = c.motion["modes"] * (len(moving) * (c.motion["intervals"] + 3) + 2 * nodes)
-                work = partial(pack.moving, c.motion, meshes, limits)
+                work = partial(unpack.motion, c.motion, meshes, budget)
                 self._once(motn.TYPE, 0, cost, work, c.motion, *moving)
 
     def _textures(self, c: Container, nets: list[Any], rasters: list[Any]) -> None:
@@ -275,48 +275,53 @@ class _Check:
     def _picture(self, c: Container) -> None:
         """Decodes all of the picture, and tries what it takes to show it, and what is odd."""
         try:
-            image = refined(c, self.usage)
+            picture = refined(c, self.usage)
         except (*_REFUSED, MemoryError) as error:
             self._streams(c)  # finds all that is wrong, not only what was met first
             if not self.failed:
                 self._report(error if isinstance(error, PxiError) else _NO_MEMORY)
             return
-        for number, own in enumerate(image.planes):
+        for number, own in enumerate(picture.planes):
             self._try(partial(getattr, own, "latents"), plan.TYPE, number)
-        self._keep(c, image)
+        self._keep(c, picture)
         if self.failed:
             return
-        self._try(partial(self._limits.check, "output_pixels", image.width * image.height))
-        for i, layer in enumerate(image.layers):
-            self._try(partial(self._drawing, image, layer), layr.TYPE, i)
+        self._try(partial(self._limits.check, "output_pixels", picture.width * picture.height))
+        for i, layer in enumerate(picture.layers):
+            self._try(partial(self._drawing, picture, layer), layr.TYPE, i)
         if not self.failed:
-            self.issues += warnings.find(image, c, self._place)
+            self.issues += warnings.find(picture, c, self._place)
 
-    def _keep(self, c: Container, image: Image) -> None:
+    def _keep(self, c: Container, picture: Picture) -> None:
         """Keeps what the chunks of the picture decode to, for states of the history."""
-        meshes = [image.layers[v["layer"]].mesh for v in c.meshes]
+        meshes = [picture.layers[v["layer"]].mesh for v in c.meshes]
         pairs = [
-            *zip(c.layers, [v.boundary for v in image.layers], strict=True),
+            *zip(c.layers, [v.boundary for v in picture.layers], strict=True),
             *zip(c.meshes, meshes, strict=True),
-            *zip(c.networks, image.networks, strict=True),
-            *zip(c.planes, image.planes, strict=True),
+            *zip(c.networks, picture.networks, strict=True),
+            *zip(c.planes, picture.planes, strict=True),
         ]
         self._results |= {(id(values),): own for values, own in pairs}
-        for v, layer in zip(c.textures, image.layers, strict=True):
+        for v, layer in zip(c.textures, picture.layers, strict=True):
             if v["coder"] == texr.IMPLICIT:
-                key = id(v), id(image.networks[v["network"]]), id(layer.sampling == 1)
+                key = id(v), id(picture.networks[v["network"]]), id(layer.sampling == 1)
                 self._results[key] = layer.texture
             elif v["coder"] == texr.PYRAMID:
-                sources = (image.planes[k] for k in (v["planes"], v["alpha"] - 1) if k >= 0)
+                sources = (picture.planes[k] for k in (v["planes"], v["alpha"] - 1) if k >= 0)
                 self._results[id(v), *map(id, sources)] = layer.texture
 
-    def _drawing(self, image: Image, layer: Layer) -> None:
+    def _drawing(self, picture: Picture, layer: Layer) -> None:
         """Tries what bent layers cost, at a small size."""
-        _ = layer.outline
-        bent = warp.Warp(layer.pose, layer.mesh, layer.sampling in (1, 2), self._limits)
+        _ = present_outline(picture, layer)
+        bent = warp.Warp(layer.pose, layer.mesh, layer.sampling in (1, 2), Budget(self._limits))
         if bent.meshed:
-            scale = min(DRAWN / max(image.width, image.height), 1)
-            box = (0, 0, max(round(image.width * scale), 1), max(round(image.height * scale), 1))
+            scale = min(DRAWN / max(picture.width, picture.height), 1)
+            box = (
+                0,
+                0,
+                max(round(picture.width * scale), 1),
+                max(round(picture.height * scale), 1),
+            )
             bent.faces(np.zeros(2), np.full(2, scale), box)
 
     def _history(self, history: Sequence[undo.Step]) -> None:
@@ -328,19 +333,20 @@ class _Check:
                 self._state = f"the state before edit {number}"
                 if any(c.type == undo.TYPE for c in step.chunks):
                     self._report(FormatError("it has a history itself", rule="MET-16"))
-                work = partial(file.assemble, [*step.chunks, _END], self._limits, self._values_of)
+                budget = Budget(self._limits)
+                work = partial(file.assemble, [*step.chunks, _END], budget, self._values_of)
                 content = self._try(work)
                 if content is not None:
                     self._streams(content)
             if chunks > HISTORY_CHUNKS or self._budget < 0:
                 detail = f"only back to edit {number} of {len(history)}"
-                self.issues.append(warnings.doubt("VAL-11", detail, *self._place(undo.TYPE, 0)))
+                self.issues.append(warnings.warning("VAL-11", detail, *self._place(undo.TYPE, 0)))
             if len(self.issues) > found:
                 return
 
 
-def _mesh(values: Values, limits: Limits) -> Mesh:
-    own = Mesh({k: v for k, v in values.items() if k != "layer"}, "", limits)
+def _mesh(values: Values, budget: Budget) -> Mesh:
+    own = Mesh({k: v for k, v in values.items() if k != "layer"}, "", budget)
     _ = own.refined
     return own
 

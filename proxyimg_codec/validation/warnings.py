@@ -10,10 +10,12 @@ import numpy as np
 
 from ..container import layr, meta, motn, pose
 from ..container.chunks import VERSION
-from ..container.file import Container
+from ..container.content import Container
 from ..errors import PxiError
-from ..image import Image, Layer
+from ..geometry.boundary import Boundary
 from ..io import xml
+from ..model import Layer, Picture
+from ..render.neighbours import present_outline
 
 ERROR, WARNING, NOTE = "error", "warning", "note"
 
@@ -62,45 +64,45 @@ Place = Callable[[str, int], tuple[str, int | None]]
 """Name and offset of the chunk with a number among those of its type."""
 
 
-def doubt(code: str, detail: str, chunk: str = "", offset: int | None = None) -> Issue:
+def warning(code: str, detail: str, chunk: str = "", offset: int | None = None) -> Issue:
     """A warning or note."""
     severity = NOTE if code in _NOTES else WARNING
     return Issue(code, severity, f"{CODES[code]}: {detail}", chunk, offset)
 
 
-def find(image: Image, c: Container, place: Place) -> Iterator[Issue]:
+def find(picture: Picture, c: Container, place: Place) -> Iterator[Issue]:
     """What is odd in a valid file.
 
     Args:
-        image: The picture.
+        picture: The picture.
         c: Its container.
         place: Tells where a chunk is.
     """
-    for chunk in image.extra:
-        yield doubt("VAL-1", f"it has {chunk.size} bytes", chunk.type, chunk.offset)
-    yield from _metadata(image, c, place)
-    for i, layer in enumerate(image.layers):
-        yield from _layer(i, layer, c, place)
+    for chunk in picture.extra:
+        yield warning("VAL-1", f"it has {chunk.size} bytes", chunk.type, chunk.offset)
+    yield from _metadata(picture, c, place)
+    for i, layer in enumerate(picture.layers):
+        yield from _layer(i, layer, present_outline(picture, layer), c, place)
 
 
 def old(version: tuple[int, int]) -> Iterator[Issue]:
     """Whether the version of a file is not the present one."""
     if version != VERSION:
-        yield doubt("VAL-12", ".".join(map(str, version)), offset=8)
+        yield warning("VAL-12", ".".join(map(str, version)), offset=8)
 
 
-def _metadata(image: Image, c: Container, place: Place) -> Iterator[Issue]:
+def _metadata(picture: Picture, c: Container, place: Place) -> Iterator[Issue]:
     for name, code, fits in (
         ("icc", "VAL-3", _is_icc), ("exif", "VAL-4", _is_exif), ("xmp", "VAL-5", _is_xml),
     ):  # fmt: skip
         block = c.blocks.get(name)
         if block is not None and not fits(block):
-            yield doubt(code, f"it has {len(block)} bytes", *place(meta.BLOCKS[name], 0))
+            yield warning(code, f"it has {len(block)} bytes", *place(meta.BLOCKS[name], 0))
     settings = c.info["settings"] if c.info else ""
-    script = image.timeline.script if image.timeline else ""
+    script = picture.timeline.script if picture.timeline else ""
     for text, type_ in ((settings, meta.INFO_TYPE), (script, motn.TYPE)):
         if text and not _is_object(text):
-            yield doubt("VAL-6", f"they have {len(text)} characters", *place(type_, 0))
+            yield warning("VAL-6", f"they have {len(text)} characters", *place(type_, 0))
 
 
 def _is_icc(block: bytes) -> bool:
@@ -128,25 +130,27 @@ def _is_object(text: str) -> bool:
         return False
 
 
-def _layer(number: int, layer: Layer, c: Container, place: Place) -> Iterator[Issue]:
+def _layer(
+    number: int, layer: Layer, outline: Boundary | None, c: Container, place: Place
+) -> Iterator[Issue]:
     home, what = place(layr.TYPE, number), f"{layer.name!r}"
     posed = [v["layer"] for v in c.poses]
     at_pose = place(pose.TYPE, posed.index(number)) if number in posed else home
     width, height = c.head["size"]
-    if layer.outline is not None:
-        x0, y0, x1, y1 = layer.outline.bounds()
+    if outline is not None:
+        x0, y0, x1, y1 = outline.bounds()
         if x0 >= width or y0 >= height or x1 <= 0 or y1 <= 0:
-            yield doubt("VAL-7", what, *home)
+            yield warning("VAL-7", what, *home)
     if layer.pose.hidden:
-        yield doubt("VAL-8", what, *at_pose)
+        yield warning("VAL-8", what, *at_pose)
     if layer.mesh is not None and layer.pose.displaced:
         refined = layer.mesh.refined
         a, b, c_ = np.moveaxis(layer.pose.present(refined)[refined.faces].astype(float), 1, 0)
         area = (b - a)[:, 0] * (c_ - a)[:, 1] - (b - a)[:, 1] * (c_ - a)[:, 0]
         turned = int(((area > 0) if layer.pose.mirrored else (area < 0)).sum())
         if turned:
-            yield doubt("VAL-9", f"{turned} of {len(area)} of {what}", *at_pose)
+            yield warning("VAL-9", f"{turned} of {len(area)} of {what}", *at_pose)
     if layer.track is not None:
         curves, shapes = layer.track.curves.any(1), layer.track.shapes.any((1, 2))
         if not (curves & shapes).any():
-            yield doubt("VAL-10", what, *place(motn.TYPE, 0))
+            yield warning("VAL-10", what, *place(motn.TYPE, 0))

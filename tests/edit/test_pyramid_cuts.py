@@ -17,7 +17,7 @@ from proxyimg_codec.image import Layers
 from proxyimg_codec.io import raster
 from proxyimg_codec.render.compose import outline
 from proxyimg_codec.render.view import make_view
-from proxyimg_codec.texture.cuts import GONE, NOTHING, Apart, Cuts
+from proxyimg_codec.texture.occlusion import ALL_REMOVED, ALL_IN_PLACE, Moved, Occlusion
 from tests.edit.test_operations import EDITS, covered, grown
 from tests.pyramids import SIZE, cut_picture, implicit, planes, view
 from tests.texture.test_cuts import near
@@ -30,7 +30,7 @@ def cut(made_up_planes):
 
 
 def kinds(image):
-    """Cuts of each layer's TEXR, ``mask`` or the number of the layer whose texture it shares."""
+    """Occlusion of each layer's TEXR, ``mask`` or the number of the layer whose texture it shares."""
     return [
         t["texture"] if t["coder"] == 0 else "mask" if t.get("mask") else t.get("cuts")
         for t in parse(image.to_bytes()).textures
@@ -59,9 +59,9 @@ def test_files_come_back_to_the_byte(cut):
     assert kinds(cut) == [[1, 2], [1, 2], [2]]
     again = same_when_loaded(cut)
     back, bar, disc = again.layers
-    assert back.texture.cuts.fronts == (bar.boundary, disc.boundary)
-    assert (bar.texture.cuts.own, back.texture.cuts.own) == (bar.boundary, None)
-    assert disc.texture.cuts.box == disc.box
+    assert back.texture.occlusion.fronts == (bar.boundary, disc.boundary)
+    assert (bar.texture.occlusion.own, back.texture.occlusion.own) == (bar.boundary, None)
+    assert disc.texture.occlusion.box == disc.box
 
 
 def test_the_hole_is_not_what_was_there(cut):
@@ -132,7 +132,7 @@ def test_a_removed_object_leaves_nothing(cut):
 def test_masks_trust_nobody_where_a_boundary_was(cut):
     """Where it is the layer's own, or in front of it, as before, mixed samples stay."""
     disc = cut.layers["disc"]
-    gone, own = Apart(frozenset([disc.boundary])), Apart(behind=GONE)
+    gone, own = Moved(frozenset([disc.boundary])), Moved(behind=ALL_REMOVED)
     left = {
         "remove": {"back": gone, "bar": gone},
         "point": {"back": gone, "bar": gone, "disc": own},
@@ -152,7 +152,7 @@ def test_masks_are_of_what_is_gone_and_cuts_of_what_is_left(cut):
     bar, disc = cut.layers["bar"].boundary, cut.layers["disc"].boundary
     moved = cut.layers["disc"].moved(0, -7).layers["bar"].removed()
     back = moved.layers["back"].texture
-    expected = cut.layers["back"].texture.masked(Apart(frozenset([bar]))).mask
+    expected = cut.layers["back"].texture.masked(Moved(frozenset([bar]))).mask
     np.testing.assert_array_equal(back.mask, expected)
     assert back.cuts.fronts == (disc,)
     same_when_loaded(moved)
@@ -161,7 +161,7 @@ def test_masks_are_of_what_is_gone_and_cuts_of_what_is_left(cut):
     shown = removed.layers["back"].texture.kept(removed.layers["back"].apart)
     assert not (shown & near(covered(cut, "disc"))).any()
     hidden = cut.layers["bar"].hidden().layers["disc"].with_point(0, 0, 3, 1)
-    expected = cut.layers["disc"].texture.masked(Apart(behind=GONE)).mask
+    expected = cut.layers["disc"].texture.masked(Moved(behind=ALL_REMOVED)).mask
     np.testing.assert_array_equal(hidden.layers["disc"].texture.mask, expected)
 
 
@@ -247,7 +247,7 @@ def test_copies_in_front_of_the_back_are_masked_with_it(cut):
     assert kinds(lent) == [[1, 2], "mask", 1]
     own = cut.layers["disc"]
     assert lent.layers["bar"].texture is lent.layers["disc"].texture
-    expected = own.texture.masked(NOTHING).mask
+    expected = own.texture.masked(ALL_IN_PLACE).mask
     np.testing.assert_array_equal(lent.layers["disc"].texture.mask, expected)
     same_when_loaded(lent)
     back = cut.layers["disc"].textured("back")
@@ -265,7 +265,7 @@ def test_copies_that_lie_elsewhere(made_up_planes):
     assert kinds(bare) == [[], "mask"]  # it is not in front of itself
     trusted = alone(image.layers["1"]).mask
     np.testing.assert_array_equal(bare.layers["2"].texture.mask, trusted)
-    assert (trusted != image.layers["1"].texture.masked(NOTHING).mask).any()
+    assert (trusted != image.layers["1"].texture.masked(ALL_IN_PLACE).mask).any()
 
 
 def test_groups_scripts_and_undo(cut):
@@ -328,7 +328,7 @@ def stack(boxes, boundaries, numbers, placed=True):
             texture=view(
                 colour,
                 part=box if placed else (0, 0, *box[2:]),
-                cuts=Cuts.of(by, k, boundaries, box),
+                cuts=Occlusion.of(by, k, boundaries, box),
             ),
         )
         for k, (box, boundary, by) in enumerate(zip(boxes, boundaries, numbers, strict=True))

@@ -8,7 +8,8 @@ from proxyimg_codec.encoder.settings import Settings
 from proxyimg_codec.encoder.shapes.layers import plan_layers
 from proxyimg_codec.encoder.shapes.masks import Region
 from proxyimg_codec.geometry.coverage import FULL, coverage
-from proxyimg_codec.io.psnr import psnr, psnr_8bit
+from proxyimg_codec.io.psnr import psnr_8bit
+from proxyimg_codec.render.quality import psnr
 from tests.conftest import disc, smooth
 
 FAST = {"texture": "implicit", "effort": 2, "jobs": 1}

@@ -12,7 +12,8 @@ import proxyimg_codec as pxi
 from proxyimg_codec.export import openraster as export
 from proxyimg_codec.export.common import at_full_opacity
 from proxyimg_codec.io import xml
-from proxyimg_codec.io.psnr import psnr, psnr_8bit
+from proxyimg_codec.io.psnr import psnr_8bit
+from proxyimg_codec.render.quality import psnr
 from proxyimg_codec.io.raster import encode_png
 from proxyimg_codec.limits import Limits
 from tests.conftest import smooth

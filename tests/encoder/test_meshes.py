@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from proxyimg_codec.encoder.encode import to_float
+from proxyimg_codec.io.samples import to_float
 from proxyimg_codec.encoder.settings import Settings
 from proxyimg_codec.encoder.shapes.layers import plan_layers
 from proxyimg_codec.encoder.shapes.masks import Region

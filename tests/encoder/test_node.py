@@ -20,7 +20,7 @@ from proxyimg_codec.encoder.shapes.masks import Region
 from proxyimg_codec.encoder.shapes.meshes import with_meshes
 from proxyimg_codec.errors import UsageError
 from proxyimg_codec.geometry.mesh import FRACTION_BITS
-from proxyimg_codec.io.psnr import psnr
+from proxyimg_codec.render.quality import psnr
 from proxyimg_codec.texture import node_sampling as decoder
 from proxyimg_codec.texture.network import NetShape
 from tests.conftest import disc, smooth

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from ...errors import UnsupportedError
 from ...texture.diffusion import FRACTION_BITS, fill
 from ...texture.implicit import taps
-from ..implicit import fit
 from ..implicit.fit_problem import Plane, Problem
+from ..implicit.state import State, quantize, rows_of
 from ..settings import Settings
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ STEPS, BATCH, RATE = 300, 2048, 1e-2
 
 
 def complete(
-    problem: Problem, state: fit.State, stored: NDArray[np.bool_], settings: Settings
+    problem: Problem, state: State, stored: NDArray[np.bool_], settings: Settings
 ) -> NDArray[np.bool_]:
     """Sets the hidden codes of the back layer in `state`; returns its new mask of stored codes.
 
@@ -63,7 +63,7 @@ def complete(
     table = torch.from_numpy(state.codes[: plane.size].copy())
     step = torch.from_numpy(state.code_steps[0])
     hidden = torch.from_numpy(~stored.ravel())
-    start = fill(fit.quantize(table.numpy(), state.code_steps[0], state.code_bits).T.reshape(
+    start = fill(quantize(table.numpy(), state.code_steps[0], state.code_bits).T.reshape(
         -1, plane.rows, plane.columns), stored)  # fmt: skip
     size = tuple(max(8, n // DELTA) for n in plane.box[:1:-1])
     small = _small_grid(start / (1 << FRACTION_BITS), size) * step[None, :, None, None]
@@ -72,11 +72,11 @@ def complete(
     net = [
         torch.from_numpy(a)
         for (w, b), s in zip(
-            fit.rows_of(problem.shape, state.weights),
+            rows_of(problem.shape, state.weights),
             np.split(state.row_steps, np.cumsum([o for _, o in problem.shape.layers])[:-1]),
             strict=True,
         )
-        for a in (fit.quantize(w, s[:, None], state.net_bits) * s[:, None], b)
+        for a in (quantize(w, s[:, None], state.net_bits) * s[:, None], b)
     ]
     rng = np.random.default_rng([settings.seed, 2])
     for _ in range(STEPS):

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ...texture.network import Floats
 from ..implicit.fit_problem import Problem, entries_of, prior_of
+from .membrane import KNOWN, continued
 
 BAND = 6
 """Pixels from the rim up to which all hidden pixels are learnt; these reach the stored codes."""
@@ -21,14 +22,8 @@ BAND = 6
 LATTICE = 3
 """Farther inside, one pixel in LATTICE x LATTICE is enough: codes there are smooth."""
 
-KNOWN, RIM = 1e4, 8.0
-"""Weights of visible pixels, and of those at the rim, whose colour may be mixed with the front's;
-a neighbour weighs 1."""
-
-SWEEPS = 16
-"""Jacobi sweeps at each level."""
-
-CROSS = np.array([[0, 1, 0], [1, 0, 1], [0, 1, 0]], np.float32)
+RIM = 8.0
+"""Weight of visible pixels at the rim, whose colour may be mixed with the front's."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,28 +93,3 @@ def _lesson(picture: Floats, hidden: NDArray[np.bool_]) -> tuple[NDArray[np.int6
     chosen[LATTICE // 2 :: LATTICE, LATTICE // 2 :: LATTICE] = True
     at = np.flatnonzero(chosen & hidden)
     return at, colour.reshape(-1, picture.shape[2])[at]
-
-
-def continued(value: Floats, weight: Floats) -> Floats:
-    """Values [H, W, C] that are smooth and near `value` where it has weight [H, W].
-
-    Minimizes approximately the squared differences of neighbours plus weight times those from
-    `value` (a screened membrane), by pull and push as the normative diffusion of codes: each level
-    halves the picture, is solved, and starts the finer one.
-    """
-    h, w = weight.shape
-    start = value
-    if max(h, w) > 1:
-        pad = ((0, h % 2), (0, w % 2))
-        blocks = ((h + 1) // 2, 2, (w + 1) // 2, 2)
-        total = np.pad(weight, pad).reshape(blocks).sum((1, 3))
-        mean = np.pad(value * weight[..., None], (*pad, (0, 0))).reshape(*blocks, -1).sum((1, 3))
-        mean /= np.maximum(total, np.float32(1e-6))[..., None]
-        coarse = continued(mean, np.minimum(total, np.float32(KNOWN)))
-        start = coarse[np.arange(h)[:, None] // 2, np.arange(w) // 2]
-    share = 1 / (4 + weight[..., None])
-    own = value * weight[..., None] * share
-    for _ in range(SWEEPS):
-        around = cv2.filter2D(start, -1, CROSS, borderType=cv2.BORDER_REPLICATE)
-        start = np.asarray(around * share + own, np.float32)
-    return start

@@ -8,15 +8,13 @@ constant. The second half trains through rounding (straight-through estimator; B
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...texture.network import Floats, NetShape
+from ...native import kernel
 from .fit_problem import Problem
+from .state import Progress, State, Trainer, best_steps, rows_of
 
 LR_CODES, LR_NET = 1.2e-2, 8e-3
 """Peak learning rates of the float phase."""
@@ -29,38 +27,6 @@ STEP_SCALE = 0.7
 
 INIT_CODES = 0.01
 """Standard deviation of initial codes."""
-
-Progress = Callable[[int], None]
-
-
-@dataclass(eq=False)
-class State:
-    """Parameters and what quantization needs.
-
-    Attributes:
-        codes: float32 [rows, D].
-        weights: float32 [parameters], per layer [out][in] rows and then the biases.
-        code_steps: float32 [planes, D]; used with `code_bits` > 0.
-        row_steps: float32 [rows of the network].
-        code_bits: 0 = not quantized.
-        net_bits: Bits a weight.
-    """
-
-    codes: Floats
-    weights: Floats
-    code_steps: Floats
-    row_steps: Floats
-    code_bits: int = 0
-    net_bits: int = 0
-
-
-class Trainer(Protocol):
-    """Runs optimizer steps on a state; keeps Adam moments between calls."""
-
-    def run(
-        self, state: State, pixels: NDArray[np.int32], lr_codes: Floats, lr_net: Floats
-    ) -> float:
-        """Steps with batches `pixels` [steps, batch]; returns the mean loss."""
 
 
 def initial(problem: Problem, seed: int) -> State:
@@ -123,16 +89,6 @@ def train(
             progress(count)
 
 
-def rows_of(shape: NetShape, flat: Floats) -> list[tuple[Floats, Floats]]:
-    """Views (weights [out, in], biases [out]) of each layer in flat parameters."""
-    out, at = [], 0
-    for inputs, outputs in shape.layers:
-        middle = at + inputs * outputs
-        out.append((flat[at:middle].reshape(outputs, inputs), flat[middle : middle + outputs]))
-        at = middle + outputs
-    return out
-
-
 def choose_steps(problem: Problem, state: State, code_bits: int, net_bits: int) -> None:
     """Sets quantization steps, rounded to float16, by least squares on the present parameters."""
     state.code_bits, state.net_bits = code_bits, net_bits
@@ -145,29 +101,8 @@ def choose_steps(problem: Problem, state: State, code_bits: int, net_bits: int) 
         steps[:] = np.maximum(steps.astype(np.float16), np.finfo(np.float16).tiny)
 
 
-def best_steps(values: Floats, bits: int) -> Floats:
-    """Step [N] that minimizes the squared rounding error of each row of `values` [N, M]."""
-    top = (1 << (bits - 1)) - 1
-    peak = np.abs(values).max(1, initial=0) + 1e-6
-    best, error = peak / max(top, 1), np.full(len(values), np.inf)
-    for fraction in np.linspace(0.3, 1, 15):
-        step = fraction * peak / max(top, 1)
-        rounded = np.clip(np.rint(values / step[:, None]), -top - 1, top) * step[:, None]
-        e = ((rounded - values) ** 2).sum(1)
-        best, error = np.where(e < error, step, best), np.minimum(e, error)
-    return np.asarray(best, np.float32)
-
-
-def quantize(values: Floats, steps: Floats, bits: int) -> NDArray[np.int8]:
-    """Integers round(values / steps), clamped to `bits` bits; half to even, as in training."""
-    top = (1 << (bits - 1)) - 1
-    return np.asarray(np.clip(np.rint(values / steps), -top - 1, top), np.int8)
-
-
 def make_trainer(problem: Problem, device: str, jobs: int) -> Trainer:
     """The compiled trainer on a CPU where it was built, otherwise torch."""
-    from ...native import kernel
-
     if device == "cpu" and kernel.available():
         from .fit_native import NativeTrainer
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from ...native import kernel
 from ...texture.network import Floats
-from .fit import State
 from .fit_problem import Problem
+from .state import State
 
 
 class NativeTrainer:

@@ -15,6 +15,7 @@ from . import fit
 from .fit_torch import TorchTrainer, interpolate
 from .node_problem import NodeProblem
 from .rounding import Model, reconstruct
+from .state import Progress, State, rows_of
 
 INIT_CODES = 0.03
 """Standard deviation of initial codes."""
@@ -65,7 +66,7 @@ class NodeTrainer(TorchTrainer):
         return out
 
 
-def initial(problem: NodeProblem, seed: int) -> fit.State:
+def initial(problem: NodeProblem, seed: int) -> State:
     """Random codes and weights; the output bias is the mean colour."""
     state = fit.initial(problem, seed)
     dim = problem.shape.dim // (bool(problem.anchors) + bool(problem.corners.shape[1]))
@@ -80,8 +81,8 @@ def fit_float(
     trainer: NodeTrainer,
     steps: int,
     seed: int,
-    progress: fit.Progress | None = None,
-) -> fit.State:
+    progress: Progress | None = None,
+) -> State:
     """Fits unquantized parameters from a random start."""
     state = initial(problem, seed)
     fit.train(problem, state, trainer, steps, (LR_CODES, LR_NET), seed, progress)
@@ -91,11 +92,11 @@ def fit_float(
 def quantize(
     problem: NodeProblem,
     trainer: NodeTrainer,
-    state: fit.State,
+    state: State,
     bits: tuple[int, int],
     steps: int,
     seed: int,
-    progress: fit.Progress | None = None,
+    progress: Progress | None = None,
 ) -> None:
     """Makes codes and weights of a float `state` multiples of steps, which it chooses.
 
@@ -110,7 +111,7 @@ def quantize(
     """
     fit.choose_steps(problem, state, *bits)
     plane = np.repeat(np.arange(len(problem.planes)), [p.size for p in problem.planes])
-    rows = fit.rows_of(problem.shape, state.weights)
+    rows = rows_of(problem.shape, state.weights)
     flat = [a for pair in rows for a in pair]
     ends = np.cumsum([o for _, o in problem.shape.layers])[:-1]
     model = Model(
@@ -137,8 +138,8 @@ def fit_quantized(
     net_bits: int,
     seed: int,
     device: str = "cpu",
-    progress: fit.Progress | None = None,
-) -> fit.State:
+    progress: Progress | None = None,
+) -> State:
     """Fits float parameters, then rounds them; as `fit.fit` for direct sampling."""
     trainer = NodeTrainer(problem, device)
     first = round(FLOAT_SHARE * steps)

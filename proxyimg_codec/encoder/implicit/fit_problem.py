@@ -9,16 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...geometry import coverage as cover
 from ...geometry.boundary import Boundary
-from ...render.compose import outline
-from ...render.view import View
 from ...texture.implicit import Box, taps
 from ...texture.network import Floats, NetShape
 from ...texture.node_sampling import DIRECT
-
-LAYERS_MAX = 64
-"""Most layers of a picture that is encoded."""
+from ..settings import LAYERS_MAX
+from ..shapes.coverage import coverage_of
 
 KNOWN = 0.25
 """A code is known if its pixels weigh at least this share of a whole cell."""
@@ -282,12 +278,3 @@ def prior_of(
     return Prior(
         rows.astype(np.int32), neighbours, (PRIOR * lack[rows] / pixels).astype(np.float32)
     )
-
-
-def coverage_of(boundary: Boundary | None, width: int, height: int) -> Floats:
-    """Coverage [width * height], 0..1."""
-    paths = outline(boundary, View(0, 0, width, height, width, height))
-    if paths is None:
-        return np.ones(width * height, np.float32)
-    covered = cover.coverage(paths, 0, 0, width, height).ravel()
-    return covered.astype(np.float32) * np.float32(1 / cover.FULL)

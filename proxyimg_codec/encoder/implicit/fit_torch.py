@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from ...errors import UnsupportedError
 from ...texture.network import Floats
-from .fit import State, rows_of
 from .fit_problem import Problem
+from .state import State, rows_of
 
 
 class TorchTrainer:

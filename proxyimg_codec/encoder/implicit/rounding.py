@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from .fit import Progress
 from .fit_torch import run_network
+from .state import Progress
 
 BATCH = 1 << 10
 """Calibration points a step."""

@@ -1,4 +1,4 @@
-"""From a picture and planned layers to an `Image` whose layers are views of shared planes."""
+"""From a picture and planned layers to an `Picture` whose layers are views of shared planes."""
 
 from __future__ import annotations
 
@@ -9,17 +9,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...codec.write import to_bytes
 from ...errors import UsageError
 from ...geometry.boundary import Boundary
-from ...image import Image, Layer, Layers
-from ...io.psnr import psnr
-from ...texture.cuts import Cuts
+from ...model import Layer, Layers, Picture
+from ...render.quality import psnr
 from ...texture.network import Floats
+from ...texture.occlusion import Occlusion
 from ...texture.planes import Planes, cells_of
 from ...texture.pyramid import PyramidTexture
-from ..completion.occluded import continued
-from ..implicit.fit_problem import coverage_of
+from ..completion.membrane import continued
 from ..settings import Settings
+from ..shapes.coverage import coverage_of
 from ..shapes.layers import Plan
 from .encode import CELL, EFFORTS, Effort, Raster, encode
 
@@ -40,7 +41,7 @@ class Interrupts:
     seen: bool = False
 
 
-def encode_picture(picture: Floats, plan: Plan, settings: Settings, report: Report) -> Image:
+def encode_picture(picture: Floats, plan: Plan, settings: Settings, report: Report) -> Picture:
     """The 8-bit picture, without metadata, of planned layers.
 
     Args:
@@ -61,7 +62,7 @@ def encode_picture(picture: Floats, plan: Plan, settings: Settings, report: Repo
         rasters.append(alpha_of(picture[..., 3]))
     interrupts = Interrupts()
 
-    def at(step: int, effort: Effort) -> Image:
+    def at(step: int, effort: Effort) -> Picture:
         sources = _coded(rasters, step, effort, settings, report, interrupts)
         layers = [
             Layer(v.name, box, v.boundary,
@@ -69,7 +70,7 @@ def encode_picture(picture: Floats, plan: Plan, settings: Settings, report: Repo
                                  cuts=cuts), v.mesh)
             for v, (box, cuts) in zip(plan.layers, views, strict=True)
         ]  # fmt: skip
-        return Image(width, height, plan.channels, plan.opaque, 8, Layers(layers), ())
+        return Picture(width, height, plan.channels, plan.opaque, 8, Layers(layers), ())
 
     effort = EFFORTS[settings.effort - 1]
     if settings.target is None:
@@ -101,19 +102,19 @@ def _coded(
 
 
 def _aimed(
-    at: Callable[[int, Effort], Image], picture: Floats, settings: Settings, effort: Effort,
+    at: Callable[[int, Effort], Picture], picture: Floats, settings: Settings, effort: Effort,
     interrupts: Interrupts,
-) -> Image:  # fmt: skip
+) -> Picture:  # fmt: skip
     """The picture at a step that hits the target: found with little effort, then corrected."""
     kind, wanted = settings.target or ("", 0.0)
     pixels = picture.shape[0] * picture.shape[1]
 
-    def off(image: Image) -> float:
+    def off(image: Picture) -> float:
         """Logarithm of the ratio to the target; positive if there are too many bits."""
         if kind == "psnr":
             found = psnr(picture if picture[..., 3].min() < 1 else picture[..., :3], image)
             return (99.0 if found is None else found) / 5 - wanted / 5
-        size = len(image.to_bytes())
+        size = len(to_bytes(image))
         return math.log((8 * size / pixels if kind == "bpp" else size) / wanted)
 
     step, slope = settings.step, -0.0095
@@ -149,7 +150,7 @@ def visible(shares: Sequence[Floats]) -> list[Floats]:
 
 def _view(
     boundaries: Sequence[Boundary | None], number: int, seen: Floats
-) -> tuple[Box, Cuts | None]:
+) -> tuple[Box, Occlusion | None]:
     """Box of a layer of which `seen` [H, W] shows, and what tells its samples of that."""
     height, width = seen.shape
     rows, columns = np.flatnonzero(seen.any(1)), np.flatnonzero(seen.any(0))
@@ -166,7 +167,7 @@ def _view(
         k for k, boundary in enumerate(boundaries)
         if boundary is not None and (k == number or (k > number and _meets(boundary, box)))
     ]  # fmt: skip
-    return box, Cuts.of(cuts, number, boundaries, box)
+    return box, Occlusion.of(cuts, number, boundaries, box)
 
 
 def _meets(boundary: Boundary, box: Box) -> bool:

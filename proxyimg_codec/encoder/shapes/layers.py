@@ -14,8 +14,7 @@ from ...errors import InputError
 from ...geometry.boundary import Boundary
 from ...geometry.mesh import Mesh
 from ...texture.network import Floats
-from ..implicit.fit_problem import LAYERS_MAX
-from ..settings import Settings
+from ..settings import LAYERS_MAX, Settings
 from .contours import fit_paths
 from .masks import Region, resolve
 

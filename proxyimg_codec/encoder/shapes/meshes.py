@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import plugins
-from ...edit.transforms import EDGE_BACK, EDGE_FRONT
 from ...geometry.boundary import Boundary
 from ...geometry.mesh import FRACTION_BITS, Base, Mesh
+from ...geometry.mesher import EDGE_BACK, EDGE_FRONT
 from ...geometry.raster import rasterize
 from ...texture.network import Floats
 from ..settings import Settings

@@ -15,7 +15,7 @@ from proxyimg_codec.encoder.pyramid.encode import Effort, Raster, Window
 from proxyimg_codec.encoder.pyramid.load import load
 from proxyimg_codec.encoder.settings import Settings
 from proxyimg_codec.errors import UsageError
-from proxyimg_codec.io.psnr import psnr
+from proxyimg_codec.render.quality import psnr
 from proxyimg_codec.texture import registered_model
 from proxyimg_codec.texture.pyramid import PyramidTexture
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from conformance.builders import ellipse, polygon
 from proxyimg_codec.geometry.boundary import Boundary
 from proxyimg_codec.texture import cuts as module
-from proxyimg_codec.texture.cuts import GONE, NOTHING, Apart, Cuts
+from proxyimg_codec.texture.occlusion import ALL_REMOVED, ALL_IN_PLACE, Moved, Occlusion
 from proxyimg_codec.texture.diffusion import diffused
 from proxyimg_codec.texture.pyramid import FILL_ONE
 from tests.pyramids import planes, view
@@ -49,7 +49,7 @@ def near(samples):
 def test_the_rule_for_rectangles(own, fronts, x, y):
     """Their coverage is the product of how far they cover a pixel across and down."""
     box = (x, y, 9, 6)
-    cuts = Cuts(own and rectangle(*own), tuple(rectangle(*v) for v in fronts), box)
+    cuts = Occlusion(own and rectangle(*own), tuple(rectangle(*v) for v in fronts), box)
 
     def covered(edge):
         return np.array(
@@ -70,7 +70,7 @@ def test_the_rule_for_curves():
     """Against ellipses a little smaller and larger, whose points in 32x32 squares a pixel count."""
     shapes = ((19, 16), (16, 14)), ((29, 12), (8, 8)), ((5, 17), (7, 6))
     own, *fronts = (Boundary(UNIT, (ellipse(*v),)) for v in shapes)
-    cuts = Cuts(own, tuple(fronts), (2, 1, 38, 32))
+    cuts = Occlusion(own, tuple(fronts), (2, 1, 38, 32))
     y, x = np.mgrid[0 : 32 * 32 + 1, 0 : 38 * 32 + 1] / 32
 
     def covered(shape, larger):
@@ -99,20 +99,20 @@ def test_the_rule_for_curves():
 
 def test_bands_do_not_show(monkeypatch):
     shapes = tuple(Boundary(UNIT, (ellipse(*v),)) for v in (((14, 11), (13, 9)), ((20, 8), (7, 7))))
-    whole = Cuts(shapes[0], shapes[1:], PART)
+    whole = Occlusion(shapes[0], shapes[1:], PART)
     kept = whole.shown, whole.trusted
     monkeypatch.setattr(module, "BAND", 50)
-    again = Cuts(shapes[0], shapes[1:], PART)
+    again = Occlusion(shapes[0], shapes[1:], PART)
     np.testing.assert_array_equal((again.shown, again.trusted), kept)
 
 
 def test_if_none_would_show_all_do():
     everything = rectangle(-1000, -1000, 10000, 10000)
-    for cuts in (Cuts(None, (everything,), PART), Cuts(rectangle(0, 0, 16, 16), (), PART)):
+    for cuts in (Occlusion(None, (everything,), PART), Occlusion(rectangle(0, 0, 16, 16), (), PART)):
         assert cuts.shown.all()
         assert cuts.trusted.all()
     assert (
-        view(planes("a", (40, 30)), part=PART, cuts=Cuts(None, (everything,), PART)).shown is None
+        view(planes("a", (40, 30)), part=PART, cuts=Occlusion(None, (everything,), PART)).shown is None
     )
 
 
@@ -120,7 +120,7 @@ def test_if_none_would_show_all_do():
 def test_if_none_can_be_trusted_all_that_show_are(across, columns):
     """The inner ones of 5 across are 3 away from what is not the layer's; of 4 across none are."""
     x, y, _, h = PART
-    cuts = Cuts(rectangle(*(16 * v for v in (x + 5, y, x + 5 + across, y + h))), (), PART)
+    cuts = Occlusion(rectangle(*(16 * v for v in (x + 5, y, x + 5 + across, y + h))), (), PART)
     assert np.flatnonzero(cuts.shown.all(0)).tolist() == list(range(5, 5 + across))
     assert np.flatnonzero(cuts.trusted.all(0)).tolist() == columns
     assert cuts.trusted.any(0).sum() == len(columns)
@@ -131,7 +131,7 @@ def cut():
     """A view from which a disc and what is beside a rectangle are cut."""
     own = rectangle(8 * 16 + 8, 5 * 16 + 3, 26 * 16, 21 * 16)
     return view(planes("a", (40, 30)), part=PART,
-                cuts=Cuts(own, (Boundary(UNIT, (ellipse((17, 12), (5, 4)),)),), PART))  # fmt: skip
+                cuts=Occlusion(own, (Boundary(UNIT, (ellipse((17, 12), (5, 4)),)),), PART))  # fmt: skip
 
 
 def centres(at):
@@ -163,24 +163,24 @@ def test_filling_waits_until_it_is_needed(cut):
 def test_what_is_kept(cut):
     """Near what is apart only trusted samples are, elsewhere all that show."""
     own, (disc,) = cut.cuts.own, cut.cuts.fronts
-    inner, outer = Cuts(own, (), PART), Cuts(None, (disc,), PART)
-    for apart, kept in [
+    inner, outer = Occlusion(own, (), PART), Occlusion(None, (disc,), PART)
+    for moved, kept in [
         (cut.cuts.everything, cut.cuts.trusted),
-        (Apart(frozenset([disc])), inner.shown & outer.trusted),
-        (Apart(behind=GONE), inner.trusted & outer.shown),
-        (NOTHING, cut.cuts.shown),
+        (Moved(frozenset([disc])), inner.shown & outer.trusted),
+        (Moved(behind=ALL_REMOVED), inner.trusted & outer.shown),
+        (ALL_IN_PLACE, cut.cuts.shown),
     ]:
-        np.testing.assert_array_equal(cut.cuts.kept(apart), kept)
-    small = Cuts(rectangle(128, 96, 160, 128), (disc,), PART)
+        np.testing.assert_array_equal(cut.cuts.kept(moved), kept)
+    small = Occlusion(rectangle(128, 96, 160, 128), (disc,), PART)
     assert 0 < small.shown.sum() < small.shown.size
     np.testing.assert_array_equal(small.kept(small.everything), small.shown)
 
 
 @given(edges, st.lists(st.tuples(st.none() | edges, st.booleans()), max_size=3))
 def test_own_samples_are_lost_beside_what_is_apart_behind(own, behind):
-    """Where the first of what lies behind a sample that is not all the layer's is apart."""
+    """Where the first of what lies behind a sample that is not all the layer's is moved."""
     box = (3, 2, 14, 9)
-    cuts = Cuts(rectangle(*own), (), box)
+    cuts = Occlusion(rectangle(*own), (), box)
 
     def covered(edge):
         return np.array(
@@ -197,29 +197,29 @@ def test_own_samples_are_lost_beside_what_is_apart_behind(own, behind):
             if below[tuple(at)] == 1 or bared[tuple(at)]:
                 break
     kept = (mine > 0) & ~near(bared)
-    apart = Apart(behind=tuple((e and rectangle(*e), rests) for e, rests in behind))
-    np.testing.assert_array_equal(cuts.kept(apart), kept if kept.any() else cuts.shown)
+    moved = Moved(behind=tuple((e and rectangle(*e), rests) for e, rests in behind))
+    np.testing.assert_array_equal(cuts.kept(moved), kept if kept.any() else cuts.shown)
 
 
 def test_what_is_apart():
     """Those in front and behind that do not rest, and what is behind only if it is cut too."""
     a, b, c, d = (rectangle(0, 0, 16 * k, 16) for k in (1, 2, 3, 4))
     twin = rectangle(0, 0, 48, 16)
-    cuts = Cuts.of([2, 3, 4], 2, [None, a, b, c, d], PART)
+    cuts = Occlusion.of([2, 3, 4], 2, [None, a, b, c, d], PART)
     rest, mine = [True] * 5, [True] * 5
     stack = [None, a, b, c, d]
-    assert cuts.apart(2, stack, rest, mine) == NOTHING
-    assert cuts.apart(2, [None, a, b, twin, d], rest, mine) == NOTHING
-    assert cuts.apart(2, stack, [*rest[:3], False, True], mine) == Apart(frozenset([c]))
-    assert cuts.apart(2, stack[:4], rest[:4], mine[:4]) == Apart(frozenset([d]))
+    assert cuts.moved(2, stack, rest, mine) == ALL_IN_PLACE
+    assert cuts.moved(2, [None, a, b, twin, d], rest, mine) == ALL_IN_PLACE
+    assert cuts.moved(2, stack, [*rest[:3], False, True], mine) == Moved(frozenset([c]))
+    assert cuts.moved(2, stack[:4], rest[:4], mine[:4]) == Moved(frozenset([d]))
     behind = ((a, True), (None, False))
-    assert cuts.apart(2, stack, [False, *rest[1:]], mine) == Apart(behind=behind)
+    assert cuts.moved(2, stack, [False, *rest[1:]], mine) == Moved(behind=behind)
     moved = [False, False, *rest[2:]]
-    assert cuts.apart(2, stack, moved, [True, False, *mine[2:]]) == Apart(behind=behind[1:])
-    assert cuts.apart(2, stack, moved, [False, False, *mine[2:]]) == NOTHING
-    assert cuts.apart(2, [None, a, a, c, d], rest, mine) == Apart(behind=GONE)
-    fronts = Cuts.of([3, 4], 2, stack, PART)
-    assert fronts.apart(2, [None, a, a, c, d], moved, mine) == NOTHING
+    assert cuts.moved(2, stack, moved, [True, False, *mine[2:]]) == Moved(behind=behind[1:])
+    assert cuts.moved(2, stack, moved, [False, False, *mine[2:]]) == ALL_IN_PLACE
+    assert cuts.moved(2, [None, a, a, c, d], rest, mine) == Moved(behind=ALL_REMOVED)
+    fronts = Occlusion.of([3, 4], 2, stack, PART)
+    assert fronts.moved(2, [None, a, a, c, d], moved, mine) == ALL_IN_PLACE
 
 
 @pytest.mark.parametrize("size", [(21, 18), (1, 1), (1, 6), (7, 2), (5, 5)])
@@ -227,9 +227,9 @@ def test_what_is_apart():
 def test_a_mask_instead_has_the_cells_that_are_kept_as_a_whole(size, there):
     box = (0, 0, *size)
     disc = Boundary(UNIT, (ellipse((2, 2), (2, 2)),))
-    texture = view(planes("a", (40, 30)), part=box, cuts=Cuts(None, (disc,), box))
-    apart = NOTHING if there else texture.cuts.everything
-    kept, masked = texture.cuts.kept(apart), texture.masked(apart)
+    texture = view(planes("a", (40, 30)), part=box, cuts=Occlusion(None, (disc,), box))
+    moved = ALL_IN_PLACE if there else texture.cuts.everything
+    kept, masked = texture.cuts.kept(moved), texture.masked(moved)
     assert masked.cuts is None
     cells = np.array(
         [[kept[2 * j : 2 * j + 2, 2 * i : 2 * i + 2].all() for i in range(-(-size[0] // 2))]
@@ -237,19 +237,19 @@ def test_a_mask_instead_has_the_cells_that_are_kept_as_a_whole(size, there):
     )  # fmt: skip
     assert cells.all() if masked.mask is None else (masked.mask == cells).all()
     assert masked.cell == (masked.mask is not None)
-    assert masked.masked(apart) is masked
+    assert masked.masked(moved) is masked
 
 
 def test_a_mask_instead_is_never_empty():
     """Without a whole cell, cells belong of which a part does; if these are all, there is none."""
     box = (0, 0, 6, 4)
     small = rectangle(16, 16, 32, 48)
-    texture = view(planes("a", (40, 30)), part=box, cuts=Cuts(small, (), box))
+    texture = view(planes("a", (40, 30)), part=box, cuts=Occlusion(small, (), box))
     assert texture.cuts.shown.sum() == 2
-    for apart in (texture.cuts.everything, NOTHING):
-        assert texture.masked(apart).mask.tolist() == [[True, False, False]] * 2
+    for moved in (texture.cuts.everything, ALL_IN_PLACE):
+        assert texture.masked(moved).mask.tolist() == [[True, False, False]] * 2
     line, box = rectangle(16, 0, 32, 64), (0, 0, 2, 4)
-    thin = view(planes("a", (40, 30)), part=box, cuts=Cuts(line, (), box))
+    thin = view(planes("a", (40, 30)), part=box, cuts=Occlusion(line, (), box))
     assert thin.cuts.shown.tolist() == [[False, True]] * 4
     masked = thin.masked(thin.cuts.everything)
     assert (masked.mask, masked.cell) == (None, 0)
@@ -260,7 +260,7 @@ def test_numbers():
     a, b, c = (rectangle(0, 0, 16 * k, 16) for k in (1, 2, 3))
     twin = rectangle(0, 0, 32, 16)
     other = Boundary(UNIT + 1, tuple(2 * p for p in b.paths))
-    cuts = Cuts.of([1, 2, 3], 1, [None, a, b, c], PART)
+    cuts = Occlusion.of([1, 2, 3], 1, [None, a, b, c], PART)
     assert (cuts.own, cuts.fronts) == (a, (b, c))
     assert cuts.numbers(1, [None, a, b, c]) == [1, 2, 3]
     assert cuts.numbers(1, [None, a, c, b]) == [1, 2, 3]
@@ -269,7 +269,7 @@ def test_numbers():
     assert cuts.numbers(1, [None, a, twin, b, c]) == [1, 3, 4]
     for gone in ([None, a, b], [None, b, a, c], [None, a, other, c], [b, a, c], [None, None, b, c]):
         assert cuts.numbers(1, gone) is None
-    front = Cuts.of([2], 0, [None, a, b], PART)
+    front = Occlusion.of([2], 0, [None, a, b], PART)
     assert (front.own, front.fronts) == (None, (b,))
     assert front.numbers(0, [None, b, b]) == [1]
-    assert Cuts.of([], 0, [None], PART) is None
+    assert Occlusion.of([], 0, [None], PART) is None

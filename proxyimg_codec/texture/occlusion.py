@@ -23,11 +23,11 @@ REACH = 2
 Samples = NDArray[np.bool_]
 
 
-class Apart(NamedTuple):
+class Moved(NamedTuple):
     """What no longer lies to a view as it did when its samples were mixed.
 
     Attributes:
-        fronts: Those of `Cuts.fronts` that do not.
+        fronts: Those of `Occlusion.fronts` that do not.
         behind: Boundaries of what lay behind, front to back, None being everywhere, each with
             whether it still lies as it did; empty if all do.
     """
@@ -36,15 +36,15 @@ class Apart(NamedTuple):
     behind: tuple[tuple[Boundary | None, bool], ...] = ()
 
 
-NOTHING = Apart()
+ALL_IN_PLACE = Moved()
 """All is as it was."""
 
-GONE = ((None, False),)
-"""`Apart.behind` if nothing is left of what lay behind."""
+ALL_REMOVED = ((None, False),)
+"""`Moved.behind` if nothing is left of what lay behind."""
 
 
 @dataclass(frozen=True, eq=False)
-class Cuts:
+class Occlusion:
     """What boundaries leave of a view whose samples lie on the canvas pixels of a box.
 
     Boundaries are those of layers when the view was made: what becomes of these changes nothing.
@@ -68,7 +68,7 @@ class Cuts:
         boundaries: Sequence[Boundary | None],
         box: Box,
         within: Samples | None = None,
-    ) -> Cuts | None:
+    ) -> Occlusion | None:
         """The cuts by layers `numbers`, of a view that layer `layer` shows in `box`.
 
         Args:
@@ -82,33 +82,37 @@ class Cuts:
             return None
         fronts = (boundaries[n] for n in numbers if n > layer)
         own = boundaries[layer] if layer in numbers else None
-        return Cuts(own, tuple(b for b in fronts if b is not None), box, within)
+        return Occlusion(own, tuple(b for b in fronts if b is not None), box, within)
 
     def numbers(self, layer: int, boundaries: Sequence[Boundary | None]) -> list[int] | None:
         """Ascending numbers for `of`; None if a boundary is not, or no longer, where it was."""
-        found = self._found(layer, boundaries)
+        found = self._matched(layer, boundaries)
         if len(found) < len({*self.fronts}) or not self._owns(boundaries[layer]):
             return None
         return sorted({*found.values(), *([] if self.own is None else [layer])})
 
-    def gone(self, layer: int, boundaries: Sequence[Boundary | None]) -> tuple[Apart, Cuts | None]:
+    def removed(
+        self, layer: int, boundaries: Sequence[Boundary | None]
+    ) -> tuple[Moved, Occlusion | None]:
         """What is gone of the boundaries, and the cuts by those that are left, if any."""
-        found = self._found(layer, boundaries)
+        found = self._matched(layer, boundaries)
         owns = self._owns(boundaries[layer])
-        gone = Apart(frozenset(f for f in self.fronts if f not in found), () if owns else GONE)
-        left = Cuts(
+        gone = Moved(
+            frozenset(f for f in self.fronts if f not in found), () if owns else ALL_REMOVED
+        )
+        left = Occlusion(
             self.own if owns else None, tuple(f for f in self.fronts if f in found), self.box
         )
         return gone, left if left.own or left.fronts else None
 
-    def apart(
+    def moved(
         self,
         layer: int,
         boundaries: Sequence[Boundary | None],
         still: Sequence[bool],
         raster: Sequence[bool],
-    ) -> Apart:
-        """What is apart from a view that layer `layer` was cut for.
+    ) -> Moved:
+        """What has moved away from a view that layer `layer` was cut for.
 
         Args:
             layer: Number of the layer.
@@ -116,21 +120,21 @@ class Cuts:
             still: Whether each lies to who shows the view as it did at rest.
             raster: Whether each shows something of the same raster.
         """
-        found = self._found(layer, boundaries)
+        found = self._matched(layer, boundaries)
         fronts = (f for f in self.fronts if f not in found or not still[found[f]])
-        behind: tuple[tuple[Boundary | None, bool], ...] = GONE
+        behind: tuple[tuple[Boundary | None, bool], ...] = ALL_REMOVED
         if self._owns(boundaries[layer]):
             below = [] if self.own is None else range(layer - 1, -1, -1)
             behind = tuple((boundaries[k], still[k]) for k in below if raster[k])
             if all(rests for _, rests in behind):
                 behind = ()
-        return Apart(frozenset(fronts), behind)
+        return Moved(frozenset(fronts), behind)
 
     def _owns(self, boundary: Boundary | None) -> bool:
         """Whether the layer's own boundary, if it cuts, is this one."""
         return self.own is None or _equal(self.own, boundary)
 
-    def _found(self, layer: int, boundaries: Sequence[Boundary | None]) -> dict[Boundary, int]:
+    def _matched(self, layer: int, boundaries: Sequence[Boundary | None]) -> dict[Boundary, int]:
         """The layers in front of layer `layer` that have the boundaries of `fronts`.
 
         Of equal boundaries the hindmost is named, those that are not only equal but the same
@@ -156,7 +160,7 @@ class Cuts:
         Those that no front covers wholly, and of which `own` covers something: all that the layer
         contributes to where nothing was moved, mixed with what is beside it or not.
         """
-        shown = self._left(NOTHING)
+        shown = self._left(ALL_IN_PLACE)
         if shown.any():
             return shown
         return ~shown if self.within is None else self.within
@@ -170,19 +174,19 @@ class Cuts:
         return self.kept(self.everything)
 
     @property
-    def everything(self) -> Apart:
-        """All that cuts, apart."""
-        return Apart(frozenset(self.fronts), GONE)
+    def everything(self) -> Moved:
+        """All that cuts, as if it had moved."""
+        return Moved(frozenset(self.fronts), ALL_REMOVED)
 
-    def kept(self, apart: Apart) -> Samples:
+    def kept(self, moved: Moved) -> Samples:
         """The samples to take as they are, bool [height, width]; `shown` if none would be.
 
-        At what is apart they are the trusted ones: mixed ones fit nothing that is left there.
+        Near what has moved they are the trusted ones: mixed ones fit nothing that is left there.
         """
-        return _kept(self, apart)
+        return _kept(self, moved)
 
-    def _left(self, apart: Apart) -> Samples:
-        """The samples that are not cut off as a whole, nor near a cut by what is apart.
+    def _left(self, moved: Moved) -> Samples:
+        """The samples that are not cut off as a whole, nor near a cut by what has moved.
 
         Unlike what is made of them, they may be none.
         """
@@ -193,20 +197,20 @@ class Cuts:
         for boundary in self.fronts:
             some, whole = self._covered(boundary)
             left &= ~whole
-            if boundary in apart.fronts:
+            if boundary in moved.fronts:
                 clear &= ~some
         if self.own is not None:
             some, whole = self._covered(self.own)
             left &= some
-            if apart.behind:
-                clear &= whole | ~self._bared(apart)
+            if moved.behind:
+                clear &= whole | ~self._bared(moved)
         return left & _eroded(clear)
 
-    def _bared(self, apart: Apart) -> Samples:
-        """The samples of which the first thing behind is apart; that may cover them in part."""
+    def _bared(self, moved: Moved) -> Samples:
+        """The samples of which the first thing behind has moved; that may cover them in part."""
         _, _, width, height = self.box
         bared, hidden = np.zeros((2, height, width), np.bool_)
-        for boundary, rests in apart.behind:
+        for boundary, rests in moved.behind:
             some, whole = self._covered(boundary)
             if rests:
                 hidden |= whole
@@ -245,9 +249,9 @@ class Cuts:
 
 
 @lru_cache(maxsize=64)
-def _kept(cuts: Cuts, apart: Apart) -> Samples:
-    """`Cuts.kept`; what is apart often stays so while it moves."""
-    kept = cuts._left(apart)
+def _kept(cuts: Occlusion, moved: Moved) -> Samples:
+    """`Occlusion.kept`; what has moved often stays the same while it is dragged."""
+    kept = cuts._left(moved)
     return kept if kept.any() else cuts.shown
 
 

@@ -1,0 +1,41 @@
+"""Smooth continuation of what is known into what is not: a screened membrane."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from ...texture.network import Floats
+
+KNOWN = 1e4
+"""Weight of values that are known; a neighbour weighs 1."""
+
+SWEEPS = 16
+"""Jacobi sweeps at each level."""
+
+CROSS = np.array([[0, 1, 0], [1, 0, 1], [0, 1, 0]], np.float32)
+
+
+def continued(value: Floats, weight: Floats) -> Floats:
+    """Values [H, W, C] that are smooth and near `value` where it has weight [H, W].
+
+    Minimizes approximately the squared differences of neighbours plus weight times those from
+    `value` (a screened membrane), by pull and push as the normative diffusion of codes: each level
+    halves the picture, is solved, and starts the finer one.
+    """
+    h, w = weight.shape
+    start = value
+    if max(h, w) > 1:
+        pad = ((0, h % 2), (0, w % 2))
+        blocks = ((h + 1) // 2, 2, (w + 1) // 2, 2)
+        total = np.pad(weight, pad).reshape(blocks).sum((1, 3))
+        mean = np.pad(value * weight[..., None], (*pad, (0, 0))).reshape(*blocks, -1).sum((1, 3))
+        mean /= np.maximum(total, np.float32(1e-6))[..., None]
+        coarse = continued(mean, np.minimum(total, np.float32(KNOWN)))
+        start = coarse[np.arange(h)[:, None] // 2, np.arange(w) // 2]
+    share = 1 / (4 + weight[..., None])
+    own = value * weight[..., None] * share
+    for _ in range(SWEEPS):
+        around = cv2.filter2D(start, -1, CROSS, borderType=cv2.BORDER_REPLICATE)
+        start = np.asarray(around * share + own, np.float32)
+    return start
