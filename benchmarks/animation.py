@@ -27,11 +27,13 @@ from benchmarks.editing import PICTURE, regions
 from proxyimg_codec.animate.animate import amplitude, preset
 from proxyimg_codec.animate.motion import PRESETS
 from proxyimg_codec.animate.sequence import frames, times
-from proxyimg_codec.edit.transforms import meshed
+from proxyimg_codec.api import Image
+from proxyimg_codec.codec.write import to_bytes
 from proxyimg_codec.encoder.shapes.masks import Region
 from proxyimg_codec.export.clip import write_clip
-from proxyimg_codec.image import Image, Layers
+from proxyimg_codec.geometry.mesher import derived
 from proxyimg_codec.io import raster
+from proxyimg_codec.model import Layers
 from proxyimg_codec.native import kernel
 
 EMOJI = "emoji_fluent3d_1f98a.webp"
@@ -66,9 +68,10 @@ def scene(data: Path) -> tuple[Pixels, list[Region]]:
 def encoded(data: Path, texture: str) -> Image:
     """The scene as a picture, with meshes of the same fineness whatever the coder."""
     pixels, masks = scene(data)
-    image = pxi.encode(pixels, masks=masks, texture=texture, effort=2, mesh="none")
-    layers = [image.layers[0], *(meshed(v, EDGE) for v in image.layers[1:])]
-    return replace(image, layers=Layers(layers))
+    picture = pxi.encode(pixels, masks=masks, texture=texture, effort=2, mesh="none").picture
+    back, *fronts = picture.layers
+    meshed = [replace(v, mesh=derived(v.boundary, picture.size, EDGE)) for v in fronts]
+    return Image(replace(picture, layers=Layers([back, *meshed])))
 
 
 def moving(image: Image, name: str, progress: Callable[[int, int], None] | None = None) -> Image:
@@ -180,8 +183,9 @@ def loops(image: Image) -> Iterator[str]:
 def stored(image: Image) -> Iterator[str]:
     """What a motion adds to a file, for each preset."""
     yield f"stored motion of {SECONDS:g} s in bytes (at most 30000): chunk mOTN, and with meshes"
-    plain = replace(image, layers=Layers(replace(v, mesh=None) for v in image.layers))
-    before = len(plain.to_bytes())
+    picture = image.picture
+    bare = Layers(replace(v, mesh=None) for v in picture.layers)
+    before = len(to_bytes(replace(picture, layers=bare)))
     for name in PRESETS:
         moved = moving(image, name)
         size = next(c.size for c in moved.chunks if c.type == "mOTN")

@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.common import Pixels, header, kodak, read_rgb
-from proxyimg_codec.encoder.encode import encode
+from proxyimg_codec import encode
+from proxyimg_codec.api import Image
 from proxyimg_codec.encoder.shapes.masks import Region
-from proxyimg_codec.image import Image
 from proxyimg_codec.io import raster
 
 WIDTH, HEIGHT = 384, 256

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from benchmarks.common import Pixels, centre_crop, kodak, read_rgb
 from proxyimg_codec.animate.animate import amplitude
 from proxyimg_codec.animate.motion import PRESETS
+from proxyimg_codec.api import Image
 from proxyimg_codec.geometry import coverage as cover
 from proxyimg_codec.geometry.mesh import FRACTION_BITS
 from proxyimg_codec.geometry.warp import Warp
-from proxyimg_codec.image import Image
 from proxyimg_codec.render.compose import outline
 from proxyimg_codec.render.view import View, make_view
 

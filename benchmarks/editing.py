@@ -19,16 +19,16 @@ from numpy.typing import NDArray
 import proxyimg_codec as pxi
 from benchmarks import background, paper
 from benchmarks.common import Pixels, centre_crop, header, kodak, read_rgb, run_limited
+from proxyimg_codec.api import Image
 from proxyimg_codec.container import mesh as mesh_chunk
 from proxyimg_codec.container.chunks import Chunk
 from proxyimg_codec.container.fields import pack
-from proxyimg_codec.io.samples import to_float
 from proxyimg_codec.encoder.settings import Settings
 from proxyimg_codec.encoder.shapes.layers import plan_layers
 from proxyimg_codec.encoder.shapes.masks import Region
 from proxyimg_codec.encoder.shapes.meshes import with_meshes
 from proxyimg_codec.geometry import coverage as cover
-from proxyimg_codec.image import Image
+from proxyimg_codec.io.samples import to_float
 from proxyimg_codec.native import kernel
 from proxyimg_codec.render.compose import outline
 from proxyimg_codec.render.view import make_view
@@ -72,7 +72,9 @@ def time_edits(path: str, engine: str) -> None:
     def turn(k: int) -> None:
         image.layers[-1].rotated(3 + k).render(engine=engine)
 
-    box = image.layers[-1].outline.bounds()
+    outline = image.layers[-1].outline
+    assert outline is not None
+    box = outline.bounds()
     top, foot = (box[0] + box[2]) / 2, box[3] - 5.0
 
     def bend(k: int) -> None:

@@ -15,8 +15,8 @@ import numpy as np
 
 import proxyimg_codec as pxi
 from benchmarks.common import read_rgb
+from proxyimg_codec.api import Image
 from proxyimg_codec.encoder.shapes.masks import Region
-from proxyimg_codec.image import Image
 from proxyimg_codec.io import raster
 
 SCRIPTS: tuple[list[dict[str, object]], ...] = (

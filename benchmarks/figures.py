@@ -15,13 +15,14 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.common import Pixels, centre_crop, header, kodak, read_rgb, run_limited
-from proxyimg_codec.encoder.encode import encode
-from proxyimg_codec.io.samples import to_float
+from proxyimg_codec import encode
 from proxyimg_codec.encoder.implicit import fit
 from proxyimg_codec.encoder.implicit.fit_problem import build
+from proxyimg_codec.encoder.implicit.state import State, rows_of
 from proxyimg_codec.encoder.settings import Settings
 from proxyimg_codec.encoder.shapes.masks import load_masks
 from proxyimg_codec.io.psnr import psnr_8bit
+from proxyimg_codec.io.samples import to_float
 from proxyimg_codec.texture.network import NetShape, encode_features
 
 FLOAT_SHAPE = NetShape(8, 6, 32, 2, 3)
@@ -44,7 +45,7 @@ def fit_float(pixels: Pixels, steps: int) -> tuple[float, int, float]:
     return value or 99.0, state.codes.size + state.weights.size, cpu
 
 
-def evaluate(problem: object, state: fit.State) -> Pixels:
+def evaluate(problem: object, state: State) -> Pixels:
     """Unquantized output [pixels, 3] of a problem with one layer, in numpy."""
     from proxyimg_codec.encoder.implicit.fit_problem import Problem
 
@@ -57,7 +58,7 @@ def evaluate(problem: object, state: fit.State) -> Pixels:
         top = state.codes[base] * (1 - fx) + state.codes[base + 1] * fx
         below = state.codes[base + stride] * (1 - fx) + state.codes[base + stride + 1] * fx
         x = encode_features(top * (1 - fy) + below * fy, problem.shape.octaves)
-        rows = fit.rows_of(problem.shape, state.weights)
+        rows = rows_of(problem.shape, state.weights)
         for k, (weight, bias) in enumerate(rows):
             x = x @ weight.T + bias
             if k + 1 < len(rows):
@@ -148,7 +149,7 @@ def layer_figures(data: Path, quick: bool) -> None:
 ENCODE = """
 import time
 from benchmarks.common import centre_crop, read_rgb
-from proxyimg_codec.encoder.encode import encode
+from proxyimg_codec import encode
 pixels = read_rgb({path!r})
 pixels = centre_crop(pixels) if {crop} else pixels
 t = time.perf_counter()

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from benchmarks.common import Pixels, read_rgb
-from proxyimg_codec.encoder.encode import encode
+from proxyimg_codec import encode
 from proxyimg_codec.encoder.shapes.masks import load_masks
 from proxyimg_codec.io import raster
 

@@ -23,8 +23,7 @@ import numpy as np
 
 from benchmarks.common import Pixels, centre_crop, header, kodak, read_rgb
 from benchmarks.figures import fit_float
-from proxyimg_codec.encoder.encode import encode
-from proxyimg_codec.io.samples import to_float
+from proxyimg_codec import encode
 from proxyimg_codec.encoder.implicit import fit_node, node_problem
 from proxyimg_codec.encoder.implicit.fit_problem import Problem, build
 from proxyimg_codec.encoder.implicit.node_problem import NodeOptions, NodeProblem
@@ -32,6 +31,7 @@ from proxyimg_codec.encoder.settings import PRESETS, Settings
 from proxyimg_codec.encoder.shapes.layers import Plan, plan_layers
 from proxyimg_codec.encoder.shapes.meshes import with_meshes
 from proxyimg_codec.io.psnr import psnr_8bit
+from proxyimg_codec.io.samples import to_float
 from proxyimg_codec.texture.network import NetShape
 
 PAPER_CODES, PAPER_PARAMETERS, PAPER_PSNR = 263, 59955, 36.99

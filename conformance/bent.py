@@ -13,7 +13,7 @@ from proxyimg_codec.entropy import arrays
 from proxyimg_codec.geometry import deltas
 from proxyimg_codec.geometry.mesh import Mesh
 from proxyimg_codec.geometry.pose import Pose
-from proxyimg_codec.image import Image
+from proxyimg_codec.model import Picture
 
 from .builders import (
     SIZE,
@@ -43,20 +43,20 @@ CLOSE: Args = {"region": [14, 5, 8, 6], "width": 32}
 
 @_case("A layer on an unrefined mesh is bent", "mesh: connectivity", "pose: displacements",
        "outline: riding", renders=[WHOLE, CLOSE])  # fmt: skip
-def _bent(n: Numbers) -> Image:
+def _bent(n: Numbers) -> Picture:
     mesh = grid_mesh((2, 1), 5, 4)
     return on_back(n, disc(n, mesh, nodes=bend(n, mesh)))
 
 
 @_case("Bent, then turned: displacements come before the affine map", "pose: order",
        renders=[WHOLE, CLOSE, {"region": [5, 3, 13, 11], "width": 27}, {"width": 9}])  # fmt: skip
-def _bent_turned(n: Numbers) -> Image:
+def _bent_turned(n: Numbers) -> Picture:
     mesh = grid_mesh((2, 1), 5, 4)
     return on_back(n, disc(n, mesh, nodes=bend(n, mesh), **TURN))
 
 
 def _closing(split: Sequence[Sequence[int]], reach: int) -> Build:
-    def build(n: Numbers) -> Image:
+    def build(n: Numbers) -> Picture:
         mesh = grid_mesh((0, -1), 3, 3, step=(512, 448), split=split)
         return on_back(n, disc(n, mesh, nodes=bend(n, mesh, reach)))
 
@@ -78,7 +78,7 @@ for _name, _title, _split in (
 
 
 @_case("A refined mesh whose midpoints are rounded down", "mesh: midpoints", renders=[CLOSE])
-def _midpoints(n: Numbers) -> Image:
+def _midpoints(n: Numbers) -> Picture:
     split = [range(18), [1, 2, 5, 9, 30, 31, 40], range(0, 28, 3)]
     mesh = grid_mesh((0, -1), 3, 3, step=(501, 477), split=split)
     return on_back(n, disc(n, mesh, nodes=bend(n, mesh, 9)))
@@ -86,7 +86,7 @@ def _midpoints(n: Numbers) -> Image:
 
 @_case("A mesh of parts that are apart, or touch in one vertex, with holes",
        "mesh: parts", "mesh: far vertices", "pose: beyond the mesh")  # fmt: skip
-def _parts(n: Numbers) -> Image:
+def _parts(n: Numbers) -> Picture:
     keep = [0, 1, 2, 4, 5, 9, 12, 13, 14, 17, 22, 23, 26, 27, 35, 38]
     mesh = grid_mesh((2, 1), 5, 4, keep=keep)
     assert len(mesh.fields["far"]) > 1
@@ -113,7 +113,7 @@ def symbols_of(mesh: Mesh) -> list[int]:
 
 @_case("A mesh that names vertices by number where it could by rank, and residuals beyond a byte",
        "mesh: far vertices", "mesh: residuals")  # fmt: skip
-def _far(n: Numbers) -> Image:
+def _far(n: Numbers) -> Picture:
     mesh = grid_mesh((2, 1), 5, 4)
     symbols, far, triangles = [1, 1, 1], [], 0
     # Which vertex a ranked symbol names is seen from the triangle that it makes.
@@ -129,7 +129,7 @@ def _far(n: Numbers) -> Image:
 
 @_case("A mesh of two parts that lie over each other: corners that wait for no triangle have no "
        "rank, however near they are", "mesh: connectivity", "mesh: overlap")  # fmt: skip
-def _overlaid(n: Numbers) -> Image:
+def _overlaid(n: Numbers) -> Picture:
     one = grid_mesh((2, 1), 3, 2).base
     x, y = one.vertices.astype(int).T
     # No parallelograms, or each corner would be just where it is expected.
@@ -157,14 +157,14 @@ def _folded_mesh() -> tuple[Mesh, NDArray[np.int64]]:
 
 @_case("A layer with folds: faces that are turned over lie behind the others",
        "mesh: folds", renders=[WHOLE, CLOSE])  # fmt: skip
-def _folded(n: Numbers) -> Image:
+def _folded(n: Numbers) -> Picture:
     mesh, nodes = _folded_mesh()
     return on_back(n, disc(n, mesh, nodes=nodes))
 
 
 @_case("The same, mirrored: the same faces lie behind the others", "mesh: folds",
        renders=[WHOLE, {"region": [2, 5, 8, 6], "width": 32}])  # fmt: skip
-def _folded_flipped(n: Numbers) -> Image:
+def _folded_flipped(n: Numbers) -> Picture:
     mesh, nodes = _folded_mesh()
     flip = {"matrix": (-UNIT, 0, 0, UNIT), "shift": (24 * 1024 + 100, 0)}
     return on_back(n, disc(n, mesh, nodes=nodes, **flip))
@@ -172,7 +172,7 @@ def _folded_flipped(n: Numbers) -> Image:
 
 @_case("The same, sheared so much that it only nearly is mirrored", "mesh: folds",
        renders=[{"region": [5, 3, 16, 12], "width": 32}])  # fmt: skip
-def _folded_sheared(n: Numbers) -> Image:
+def _folded_sheared(n: Numbers) -> Picture:
     mesh, nodes = _folded_mesh()
     shear = {"matrix": (UNIT, UNIT // 2, UNIT // 2, UNIT), "shift": (-4096, -5120)}
     return on_back(n, disc(n, mesh, nodes=nodes, **shear))
@@ -180,7 +180,7 @@ def _folded_sheared(n: Numbers) -> Image:
 
 @_case("Two parts of a mesh that are pushed over each other: the first face shows",
        "mesh: overlap", renders=[WHOLE, CLOSE])  # fmt: skip
-def _overlap(n: Numbers) -> Image:
+def _overlap(n: Numbers) -> Picture:
     mesh = grid_mesh((2, 1), 5, 4, keep=[k for k in range(40) if k % 10 not in (4, 5)])
     x = mesh.refined.nodes[:, 0] >> 10
     nodes = np.stack([np.where(x < 12, 67, -59), np.where(x < 12, 9, -7)], axis=1)
@@ -189,20 +189,20 @@ def _overlap(n: Numbers) -> Image:
 
 @_case("A layer that reaches far beyond its mesh on all sides", "pose: beyond the mesh",
        "outline: riding", renders=[WHOLE, CLOSE])  # fmt: skip
-def _beyond(n: Numbers) -> Image:
+def _beyond(n: Numbers) -> Picture:
     mesh = grid_mesh((9, 7), 2, 2, step=(192, 160))
     return on_back(n, disc(n, mesh, nodes=bend(n, mesh)))
 
 
 @_case("A layer so large against its mesh that weights are clamped", "pose: beyond the mesh",
        "outline: weights")  # fmt: skip
-def _beyond_far(n: Numbers) -> Image:
+def _beyond_far(n: Numbers) -> Picture:
     mesh = grid_mesh((11, 8), 1, 1, step=(20, 20))
     return on_back(n, disc(n, mesh, nodes=bend(n, mesh, 2)))
 
 
 @_case("Faces that are pressed to a line or a point hold no samples", "mesh: faces without area")
-def _pressed_faces(n: Numbers) -> Image:
+def _pressed_faces(n: Numbers) -> Picture:
     mesh = grid_mesh((2, 1), 5, 4)
     x, y = (mesh.refined.nodes >> 6).T
     nodes = np.stack([np.where(x > 200, 200 - x, 0), np.where(y > 140, 140 - y, 0)], axis=1)
@@ -211,7 +211,7 @@ def _pressed_faces(n: Numbers) -> Image:
 
 @_case("A bent boundary of long segments, which are divided into up to 64 pieces",
        "outline: pieces", renders=[WHOLE, CLOSE])  # fmt: skip
-def _pieces(n: Numbers) -> Image:
+def _pieces(n: Numbers) -> Picture:
     mesh = grid_mesh((0, -1), 6, 5)
     shape = ellipse((12, 9), (11.5, 8.5)), polygon((3, 3), (300, 8.5), (5, 14), reverse=True)
     pose = Pose(nodes=bend(n, mesh))
@@ -221,7 +221,7 @@ def _pieces(n: Numbers) -> Image:
 
 @_case("A mesh wider than 4,096 pixels, for which weights are computed from fewer bits, and "
        "displacements of 15 bits and more", "outline: weights", renders=[WHOLE, CLOSE])  # fmt: skip
-def _wide(n: Numbers) -> Image:
+def _wide(n: Numbers) -> Picture:
     # Two refinements of the triangles at the canvas: faces are small against the whole.
     plain = grid_mesh((-15001, -3003), 15, 3, step=(140001, 140003))
     corners = plain.base.positions[plain.base.triangles] >> 10
@@ -237,7 +237,7 @@ def _wide(n: Numbers) -> Image:
 
 @_case("A back layer without boundary is bent: its outline is the bent canvas",
        "outline: the whole canvas", renders=[WHOLE, CLOSE])  # fmt: skip
-def _bent_back(n: Numbers) -> Image:
+def _bent_back(n: Numbers) -> Picture:
     mesh = grid_mesh((-1, -1), 2, 2, step=(832, 640))
     image = on_back(n, disc(n))
     back = replace(image.layers[0], mesh=mesh, pose=Pose(nodes=bend(n, mesh, 60)))

@@ -18,7 +18,7 @@ from proxyimg_codec.container.file import fields_of
 from proxyimg_codec.geometry.boundary import Boundary
 from proxyimg_codec.geometry.mesh import Base, Mesh
 from proxyimg_codec.geometry.pose import REST, Pose
-from proxyimg_codec.image import Image, Layer, Layers
+from proxyimg_codec.model import Layer, Layers, Picture
 from proxyimg_codec.texture.implicit import Box, ImplicitTexture
 from proxyimg_codec.texture.network import NetShape, Network
 from proxyimg_codec.texture.pyramid import Texture
@@ -187,13 +187,13 @@ def picture(
     *networks: Network,
     opaque: bool = True,
     extra: Sequence[Chunk] = (),
-) -> Image:
+) -> Picture:
     """An image of `layers`, back to front."""
     channels = max(v.texture.channels(networks) for v in layers)
-    return Image(*size, channels, opaque, 8, Layers(layers), networks, extra=tuple(extra))
+    return Picture(*size, channels, opaque, 8, Layers(layers), networks, extra=tuple(extra))
 
 
-def layered(n: Numbers, channels: int = 3) -> Image:
+def layered(n: Numbers, channels: int = 3) -> Picture:
     """Three layers: a back, an ellipse and a triangle that overlap."""
     w, h = 32, 24
     return picture(
@@ -221,7 +221,7 @@ def disc(n: Numbers, mesh: Mesh | None = None, **pose: Any) -> Layer:
     return layer("disc", (4, 3, 16, 12), plane, shape, mesh=mesh, pose=Pose(**pose))
 
 
-def on_back(n: Numbers, *layers: Layer, channels: int = 3) -> Image:
+def on_back(n: Numbers, *layers: Layer, channels: int = 3) -> Picture:
     """A picture of `SIZE` with a back layer behind `layers`, and one network."""
     back = layer("back", (0, 0, *SIZE), texture(n))
     net = network(n, channels=channels, contrast=0.6 if channels == 3 else 1.5)

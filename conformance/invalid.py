@@ -10,9 +10,10 @@ from typing import Any
 import msgpack
 import numpy as np
 
+from proxyimg_codec.codec.write import to_bytes
 from proxyimg_codec.container.chunks import MAPS_UNTIL, Chunk, read, write
 from proxyimg_codec.entropy import arrays
-from proxyimg_codec.image import Image
+from proxyimg_codec.model import Picture
 
 from .builders import Numbers, changed, ellipse, layer, network, picture, texture, values
 
@@ -27,10 +28,10 @@ class Base:
     """A valid file: a back and a disc with a mask, 5-bit codes, one network."""
 
     def __init__(self) -> None:
-        self.data = self.build(Numbers("base")).to_bytes()
+        self.data = to_bytes(self.build(Numbers("base")))
         self.chunks = read(self.data)
 
-    def build(self, n: Numbers) -> Image:
+    def build(self, n: Numbers) -> Picture:
         """The picture."""
         stored = n.integers(0, 2, GRID[::-1]) > 0
         back = layer("back", (0, 0, 12, 10), texture(n, grid=GRID, bits=5))

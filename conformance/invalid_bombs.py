@@ -11,7 +11,7 @@ import numpy as np
 
 from proxyimg_codec.container.chunks import write
 from proxyimg_codec.geometry.pose import Pose
-from proxyimg_codec.image import Image, Layer
+from proxyimg_codec.model import Layer, Picture
 
 from .builders import Numbers, changed, ellipse, grid_mesh, layer, network, picture, texture
 from .invalid import BACK, BACK_TEXR, DISC, DISC_TEXR, HEAD, NETW, Base, Invalid
@@ -28,7 +28,7 @@ def stream(words: int = 0) -> bytes:
 class Fine(Base):
     """A valid file: a layer that is bent by a mesh of many faces, most of them beside it."""
 
-    def build(self, n: Numbers) -> Image:
+    def build(self, n: Numbers) -> Picture:
         """The picture."""
         split = [range(count) for count in (1054, 4216)]
         mesh = grid_mesh((0, 0), 31, 17, step=(64, 64), cell=8, split=split)
@@ -44,7 +44,7 @@ class FarPoints(Base):
 
     POSE = 4
 
-    def build(self, n: Numbers) -> Image:
+    def build(self, n: Numbers) -> Picture:
         """The picture."""
         split = [range(count) for count in (1054, 4216, 16_864)]
         mesh = grid_mesh((8, 0), 31, 17, step=(32, 32), cell=8, split=split)
@@ -62,7 +62,7 @@ class Many(Base):
 
     count, dim, hidden, depth = 129, 1, 1, 1
 
-    def build(self, n: Numbers) -> Image:
+    def build(self, n: Numbers) -> Picture:
         """The picture."""
         shown = texture(n, dim=self.dim, grid=(2, 2))
         layers = [layer(str(k), (0, 0, 1, 1), shown) for k in range(self.count)]
@@ -106,7 +106,7 @@ class ManyAnchors(Many):
 class Lines(Base):
     """A valid file: a layer whose boundary goes to and fro, thousands of pixels beyond the row."""
 
-    def build(self, n: Numbers) -> Image:
+    def build(self, n: Numbers) -> Picture:
         """The picture."""
         there = np.arange(4)[:, None] * (87_380, 1)
         path = np.concatenate([there[:3], there[:0:-1]] * 2050)

@@ -13,7 +13,7 @@ from proxyimg_codec.container.chunks import Chunk, write
 from proxyimg_codec.geometry import deltas, track
 from proxyimg_codec.geometry.mesh import Mesh
 from proxyimg_codec.geometry.track import Track
-from proxyimg_codec.image import Image
+from proxyimg_codec.model import Picture
 
 from .builders import Numbers, ellipse, grid_mesh, layer, network, picture, polygon, texture
 from .invalid import Base, Invalid, put
@@ -30,7 +30,7 @@ LINE = replace(LOOP, script='{"version": 1, "preset": "jelly"}\n')
 class Moving(Base):
     """A valid file: a back with a mesh, a disc and a bar that move, and a layer without mesh."""
 
-    def build(self, n: Numbers) -> Image:
+    def build(self, n: Numbers) -> Picture:
         """The picture."""
         shown = texture(n, grid=(4, 4))
         split = grid_mesh((1, 1), 2, 2, step=(320, 288), split=[[0, 3]])

@@ -14,7 +14,7 @@ from proxyimg_codec.entropy import arrays
 from proxyimg_codec.geometry import deltas
 from proxyimg_codec.geometry.mesh import Mesh
 from proxyimg_codec.geometry.pose import Pose, encode
-from proxyimg_codec.image import Image
+from proxyimg_codec.model import Picture
 
 from .bent import UNIT
 from .builders import (
@@ -41,7 +41,7 @@ class Posed(Base):
 
     dim, channels = 4, 3
 
-    def build(self, n: Numbers) -> Image:
+    def build(self, n: Numbers) -> Picture:
         """The picture."""
         planes = [texture(n, dim=self.dim) for _ in range(2)]
         mesh = grid_mesh((1, 1), 2, 2, step=(320, 288), split=[[0, 3]])

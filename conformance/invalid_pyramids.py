@@ -11,7 +11,7 @@ import numpy as np
 
 from proxyimg_codec.container.chunks import Chunk, write
 from proxyimg_codec.entropy import arrays
-from proxyimg_codec.image import Image
+from proxyimg_codec.model import Picture
 from proxyimg_codec.texture import planes
 from proxyimg_codec.texture.planes import Latents
 
@@ -30,7 +30,7 @@ CLEAR_TEXR = (5, 6)
 class Views(Base):
     """A valid file: a back and a disc that show the same planes, which have a support."""
 
-    def build(self, n: Numbers) -> Image:
+    def build(self, n: Numbers) -> Picture:
         """The picture."""
         cells = np.array([[1, 0, 1], [1, 1, 1], [0, 1, 1]], bool)
         source = coded(n, SIZE, cells=cells, large=(90, -300))
@@ -48,7 +48,7 @@ class Views(Base):
 class Clear(Base):
     """A valid file with alpha: two layers that show the same planes."""
 
-    def build(self, n: Numbers) -> Image:
+    def build(self, n: Numbers) -> Picture:
         """The picture."""
         source, alpha = coded(n, (12, 10)), coded(n, (12, 10), components=1)
         box = 0, 0, 12, 10
@@ -65,7 +65,7 @@ class Clear(Base):
 class Last(Base):
     """A valid file whose last latent, and no other, escapes."""
 
-    def build(self, n: Numbers) -> Image:
+    def build(self, n: Numbers) -> Picture:
         """The picture."""
         level, lowest = np.zeros((9, 1, 1), np.int32), np.zeros((3, 1, 1), np.int32)
         level[8] = 65535

@@ -21,10 +21,10 @@ from unittest import mock
 
 import numpy as np
 
-from proxyimg_codec import errors
+from proxyimg_codec import errors, from_bytes
 from proxyimg_codec.codec import levels
+from proxyimg_codec.codec.write import to_bytes
 from proxyimg_codec.container import chunks, layr, motn, pose
-from proxyimg_codec.image import from_bytes
 from proxyimg_codec.io.raster import encode_png
 from proxyimg_codec.native import kernel
 
@@ -98,7 +98,7 @@ def build() -> dict[str, Made]:
 def _valid(name: str, case: Valid) -> Made:
     numbers = Numbers(name)
     made = case.build(numbers)
-    data = made if isinstance(made, bytes) else made.to_bytes()
+    data = made if isinstance(made, bytes) else to_bytes(made)
     profile, level = levels.profile_and_level(data)
     description = _described(case, numbers.seed)
     description |= {"profile": profile, "level": level, "renders": _renders(case.renders)}

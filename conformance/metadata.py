@@ -9,10 +9,11 @@ from typing import Any
 
 import msgpack
 
+from proxyimg_codec.codec.write import to_bytes
 from proxyimg_codec.container import meta, motn, tree, undo
 from proxyimg_codec.container.chunks import PREFIX, Chunk, read, write
 from proxyimg_codec.container.fields import pack
-from proxyimg_codec.image import Image
+from proxyimg_codec.model import Picture
 
 from .builders import Numbers, changed, layer, layered, network, picture, texture, with_maps
 from .frames import checksum, frame, metadata
@@ -25,7 +26,7 @@ _case = CASES.case
 
 def _plain(n: Numbers) -> bytes:
     """A small file, higher than it is wide."""
-    return picture((8, 12), [layer("back", (0, 0, 8, 12), texture(n))], network(n)).to_bytes()
+    return to_bytes(picture((8, 12), [layer("back", (0, 0, 8, 12), texture(n))], network(n)))
 
 
 def with_chunks(data: bytes, *chunks: Chunk) -> bytes:
@@ -98,7 +99,7 @@ def _info_deep(n: Numbers) -> bytes:
 
 @_case("Names of layers that are paths, control characters, or alike but for normalization",
        "CHK-5", "SEC-13", renders=[WHOLE, {"layers": ["\u00e9"]}])  # fmt: skip
-def _names(n: Numbers) -> Image:
+def _names(n: Numbers) -> Picture:
     image = layered(n)
     names = "../../\0\u202e/etc/passwd", "\u00e9", "e\u0301"
     layers = [replace(v, name=name) for v, name in zip(image.layers, names, strict=True)]
@@ -107,7 +108,7 @@ def _names(n: Numbers) -> Image:
 
 @_case("A layer whose name has 255 characters of four bytes each", "CHK-1", "CON-16",
        renders=[WHOLE, {"layers": ["\U0001f98a" * 255]}])  # fmt: skip
-def _name_long(n: Numbers) -> Image:
+def _name_long(n: Numbers) -> Picture:
     image = layered(n)
     layers = [image.layers[0], replace(image.layers[1], name="\U0001f98a" * 255), image.layers[2]]
     return replace(image, layers=type(image.layers)(layers))
@@ -116,7 +117,7 @@ def _name_long(n: Numbers) -> Image:
 @_case("Ancillary chunks of a later version, safe and unsafe to copy, and many empty ones",
        "chunks: ancillary")  # fmt: skip
 def _ancillary_public(n: Numbers) -> bytes:
-    parts = read(layered(n).to_bytes())
+    parts = read(to_bytes(layered(n)))
     later = Chunk("nEWs", b"\xc1" * 999), Chunk("nEWS", msgpack.packb({"a": [None, 1.5]}))
     return write([parts[0], *later, *parts[1:-1], *[Chunk("emTy", b"")] * 300, parts[-1]])
 
@@ -169,7 +170,7 @@ def scripted(zstd: bytes, size: int) -> bytes:
 @_case("A file that is a ZIP archive too, in a private chunk", "CON-9", "CON-12", "REG-3",
        name="polyglot-zip")  # fmt: skip
 def _zip(n: Numbers) -> bytes:
-    data = layered(n).to_bytes()
+    data = to_bytes(layered(n))
     tail = len(write([Chunk("TAIL", b"")])) - PREFIX.size
     archive = io.BytesIO()
     with zipfile.ZipFile(archive, "w") as files:
@@ -185,6 +186,6 @@ def _zip(n: Numbers) -> bytes:
 @_case("A file that is a page and a script too, in private chunks", "CON-9", "CON-12", "REG-3",
        "SEC-1", name="polyglot-html")  # fmt: skip
 def _html(n: Numbers) -> bytes:
-    parts = read(layered(n).to_bytes())
+    parts = read(to_bytes(layered(n)))
     page = b"<html><script>alert(1)</script><img src=x onerror=alert(1)>\n#!/bin/sh\nexit 1\n"
     return write([parts[0], Chunk("htMl", page), *parts[1:-1], Chunk("jsSc", page), parts[-1]])

@@ -11,8 +11,8 @@ from proxyimg_codec.geometry.boundary import Boundary
 from proxyimg_codec.geometry.mesh import Mesh
 from proxyimg_codec.geometry.pose import Pose
 from proxyimg_codec.geometry.track import Timeline, Track
-from proxyimg_codec.image import Image, Layer, Layers
-from proxyimg_codec.texture.cuts import Cuts
+from proxyimg_codec.model import Layer, Layers, Picture
+from proxyimg_codec.texture.occlusion import Occlusion
 
 from .bent import CLOSE, TURN
 from .builders import (
@@ -46,13 +46,13 @@ def track(n: Numbers, mesh: Mesh, line: Timeline, modes: int = 2, reach: int = 2
     )
 
 
-def moving(image: Image, line: Timeline, tracks: Mapping[str, Track]) -> Image:
+def moving(image: Picture, line: Timeline, tracks: Mapping[str, Track]) -> Picture:
     """An image whose layers move, by their names."""
     layers = [replace(v, track=tracks.get(v.name)) for v in image.layers]
     return replace(image, layers=Layers(layers), timeline=line)
 
 
-def _disc(n: Numbers, line: Timeline, modes: int = 2, reach: int = 24) -> Image:
+def _disc(n: Numbers, line: Timeline, modes: int = 2, reach: int = 24) -> Picture:
     """A disc that moves on a back layer."""
     mesh = grid_mesh((2, 1), 5, 4)
     image = on_back(n, disc(n, mesh))
@@ -67,21 +67,21 @@ def _at(*times: float) -> list[Args]:
 @_case("A layer that moves in a loop: within it, beyond its end and before its beginning",
        "MOT-2", "MOT-6", "MOT-7",
        renders=_at(0.37, 1.45, 7.000003, -0.83, 1.5))  # fmt: skip
-def _moves_loop(n: Numbers) -> Image:
+def _moves_loop(n: Numbers) -> Picture:
     return _disc(n, LOOP)
 
 
 @_case("A layer that moves once, made by a script, and stays as it is at both ends",
        "MOT-2", "MOT-6", "MOT-7", "MOT-10",
        renders=_at(0.61, -0.5, 1.501, 9.75))  # fmt: skip
-def _moves_once(n: Numbers) -> Image:
+def _moves_once(n: Numbers) -> Picture:
     return _disc(n, ONCE)
 
 
 @_case("Layers on refined meshes with several shapes, around one that does not move",
        "MOT-1", "MOT-3", "MOT-4", "mesh: midpoints",
        renders=_at(0.21, 1.3))  # fmt: skip
-def _moves_layers(n: Numbers) -> Image:
+def _moves_layers(n: Numbers) -> Picture:
     meshes = {
         "disc": grid_mesh((2, 1), 5, 4, split=[[3, 8, 9, 21], [1, 2]]),
         "still": grid_mesh((9, 1), 2, 2),
@@ -100,7 +100,7 @@ def _moves_layers(n: Numbers) -> Image:
 
 @_case("A layer that was bent and turned moves: displacements add up before the affine map",
        "MOT-8", "pose: order", renders=_at(0.7, 1.1))  # fmt: skip
-def _moves_posed(n: Numbers) -> Image:
+def _moves_posed(n: Numbers) -> Picture:
     mesh = grid_mesh((2, 1), 5, 4)
     image = on_back(n, disc(n, mesh, nodes=bend(n, mesh), opacity=60000, **TURN))
     return moving(image, LOOP, {"disc": track(n, mesh, LOOP)})
@@ -108,7 +108,7 @@ def _moves_posed(n: Numbers) -> Image:
 
 for _unit, _modes, _reach in ((0, 1, 2), (6, 5, 70)):
 
-    def _build(n: Numbers, unit: int = _unit, modes: int = _modes, reach: int = _reach) -> Image:
+    def _build(n: Numbers, unit: int = _unit, modes: int = _modes, reach: int = _reach) -> Picture:
         return _disc(n, replace(LOOP, unit=unit), modes, reach)
 
     _shapes = "One shape" if _modes == 1 else f"{_modes} shapes"
@@ -119,7 +119,7 @@ for _unit, _modes, _reach in ((0, 1, 2), (6, 5, 70)):
 
 for _line in (replace(LOOP, intervals=1), replace(LOOP, intervals=2), replace(ONCE, intervals=1)):
 
-    def _short(n: Numbers, line: Timeline = _line) -> Image:
+    def _short(n: Numbers, line: Timeline = _line) -> Picture:
         return _disc(n, line)
 
     _name = f"moves-{'loop' if _line.loop else 'once'}-{_line.intervals}"
@@ -132,7 +132,7 @@ for _line in (replace(LOOP, intervals=1), replace(LOOP, intervals=2), replace(ON
 
 @_case("A back layer without boundary moves: its outline is the bent canvas",
        "MOT-8", "outline: the whole canvas", renders=[WHOLE, {"time": 0.4}])  # fmt: skip
-def _moves_canvas(n: Numbers) -> Image:
+def _moves_canvas(n: Numbers) -> Picture:
     mesh = grid_mesh((-1, -1), 2, 2, step=(832, 640))
     image = on_back(n, disc(n))
     layers = Layers([replace(image.layers[0], mesh=mesh), image.layers[1]])
@@ -142,7 +142,7 @@ def _moves_canvas(n: Numbers) -> Image:
 
 @_case("A node is flung so far that its displacement is clamped", "MOT-5", "MOT-7",
        renders=_at(0.4))  # fmt: skip
-def _moves_far(n: Numbers) -> Image:
+def _moves_far(n: Numbers) -> Picture:
     mesh = grid_mesh((2, 1), 5, 4)
     nodes = mesh.refined.nodes
     shapes = np.zeros((2, *nodes.shape), np.int64)
@@ -160,12 +160,12 @@ def _moves_far(n: Numbers) -> Image:
 
 @_case("A layer of which no node is displaced is bent all the same: what is mixed with it does "
        "not show", "MOT-8", "pyramid: cuts", renders=[WHOLE, {"time": 0.5}])  # fmt: skip
-def _moves_nowhere(n: Numbers) -> Image:
+def _moves_nowhere(n: Numbers) -> Picture:
     box, mesh = (4, 3, 16, 12), grid_mesh((2, 1), 5, 4)
     source, ring = coded(n, SIZE, levels=3), Boundary(4, (RING,))
     shapes = None, ring
-    back = view(source, cuts=Cuts.of([1], 0, shapes, (0, 0, *SIZE)))
-    front = view(source, part=box, cuts=Cuts.of([1], 1, shapes, box))
+    back = view(source, cuts=Occlusion.of([1], 0, shapes, (0, 0, *SIZE)))
+    front = view(source, part=box, cuts=Occlusion.of([1], 1, shapes, box))
     image = picture(
         SIZE,
         [
@@ -176,7 +176,7 @@ def _moves_nowhere(n: Numbers) -> Image:
     return moving(image, LOOP, {"disc": track(n, mesh, LOOP, 1, 0)})
 
 
-def _bodies(n: Numbers, numbers: tuple[int, int]) -> Image:
+def _bodies(n: Numbers, numbers: tuple[int, int]) -> Picture:
     """A bar on a disc on a back layer, cut by each other; disc and bar move alike."""
     meshes = grid_mesh((4, 2), 7, 7), grid_mesh((9, 6), 8, 4)
     image = pieces(n, {})
@@ -197,11 +197,11 @@ _APART = [WHOLE, *({"time": 0.5, "layers": [v]} for v in ("disc", "bar")), {"tim
 
 @_case("Two layers move as one body: what they are mixed with of each other shows, but not of the "
        "back layer", "MOT-9", "pyramid: cuts", renders=_APART)  # fmt: skip
-def _moves_together(n: Numbers) -> Image:
+def _moves_together(n: Numbers) -> Picture:
     return _bodies(n, (7, 7))
 
 
 @_case("Two layers move alike, but as two bodies: what they are mixed with does not show",
        "MOT-9", "pyramid: cuts", renders=_APART)  # fmt: skip
-def _moves_apart(n: Numbers) -> Image:
+def _moves_apart(n: Numbers) -> Picture:
     return _bodies(n, (7, 0))

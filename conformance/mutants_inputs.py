@@ -95,7 +95,7 @@ def _expected(target: Path, data: bytes, dice: random.Random | None) -> dict[str
     Raises:
         MemoryError: It is too large to try all mutants on it.
     """
-    from proxyimg_codec.image import from_bytes
+    from proxyimg_codec import from_bytes
     from proxyimg_codec.io.raster import encode_png
 
     from .symbols import digest
@@ -130,8 +130,8 @@ def _views(image: Any, dice: random.Random | None) -> Iterator[Args]:
 
 def _files(dice: random.Random) -> Iterator[tuple[str, bytes]]:
     """Files by name."""
+    from proxyimg_codec import from_bytes
     from proxyimg_codec.errors import PxiError
-    from proxyimg_codec.image import from_bytes
 
     good = {name: image.to_bytes() for name, image in _encoded()}
     yield from good.items()

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from proxyimg_codec.geometry.pose import Pose
-from proxyimg_codec.image import Image
+from proxyimg_codec.model import Picture
 from proxyimg_codec.texture.network import Network
 
 from .builders import (
@@ -28,7 +28,7 @@ _case = CASES.case
 
 
 def _octaves(octaves: int) -> Build:
-    def build(n: Numbers) -> Image:
+    def build(n: Numbers) -> Picture:
         back = layer("back", (0, 0, 16, 12), texture(n, dim=2, reach=1))
         # In single precision, what is left of a feature in the highest octaves is little.
         net = network(n, dim=2, octaves=octaves, hidden=8, contrast=0.6 if octaves < 9 else 0.2)
@@ -46,14 +46,14 @@ for _count in range(1, 13):
 
 
 @_case("The most features, and few of everything else", "network: depth and width")
-def _network_wide(n: Numbers) -> Image:
+def _network_wide(n: Numbers) -> Picture:
     back = layer("back", (0, 0, 16, 12), texture(n, dim=64, grid=(3, 2)))
     return picture((16, 12), [back], network(n, dim=64, octaves=0, hidden=1, depth=1))
 
 
 @_case("Steps of the smallest and the largest float16, biases of both signs and minus zero",
        "TEX-3", "TEX-10", "TEX-16", "TEX-17")  # fmt: skip
-def _network_steps(n: Numbers) -> Image:
+def _network_steps(n: Numbers) -> Picture:
     net = network(n, dim=3, octaves=0, hidden=4)
     smallest, largest = np.float16(2.0**-24), np.float16(65504)
     # Hidden values that are huge, times steps that are tiny.
@@ -77,7 +77,7 @@ def _huge(n: Numbers) -> Network:
 
 @_case("A network whose numbers overflow, in a layer of no opacity: a decoder must survive it",
        "TEX-18", "TEX-19", "MSH-35", "SEC-1")  # fmt: skip
-def _network_overflow(n: Numbers) -> Image:
+def _network_overflow(n: Numbers) -> Picture:
     shape = ellipse((12, 9), (7, 5.5))
     glass = layer("glass", (4, 3, 16, 12), texture(n, network=1), shape, pose=Pose(opacity=0))
     back = layer("back", (0, 0, *SIZE), texture(n))
@@ -87,7 +87,7 @@ def _network_overflow(n: Numbers) -> Image:
 @_case("Several layers with several holes each, through which others and nothing show",
        "coverage: hole", "compositing: order", "alpha: from coverage alone",
        renders=[WHOLE, {"region": [4, 3, 9, 7], "width": 36}])  # fmt: skip
-def _holes(n: Numbers) -> Image:
+def _holes(n: Numbers) -> Picture:
     w, h = SIZE
     sheet = polygon((1, 1), (w - 1, 1), (w - 1, h - 1), (1, h - 1))
     first = sheet, ellipse((8, 8), (4, 4), reverse=True), ellipse((17, 9), (3, 5), reverse=True)
@@ -112,7 +112,7 @@ def _holes(n: Numbers) -> Image:
 
 @_case("Boundaries in all units, from whole pixels to 1/64", "boundary: unit", "GEO-7",
        renders=[WHOLE, {"width": 53}])  # fmt: skip
-def _units(n: Numbers) -> Image:
+def _units(n: Numbers) -> Picture:
     w, h = SIZE
     shown = texture(n)
     parts = []

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from proxyimg_codec.geometry.pose import Pose
-from proxyimg_codec.image import Image
+from proxyimg_codec.model import Picture
 
 from .bent import CLOSE, TURN
 from .builders import (
@@ -29,7 +29,7 @@ BOTH, LOCAL, GLOBAL = 1, 2, 3
 PATHS = ellipse((12, 9), (7, 5.5)), polygon((12, 7), (10, 12), (15, 10.5))
 
 
-def _sampled(n: Numbers, sampling: int, bent: bool, features: int = 3, **pose: Any) -> Image:
+def _sampled(n: Numbers, sampling: int, bent: bool, features: int = 3, **pose: Any) -> Picture:
     """A ring with a mesh on a back layer, which is sampled in the same way."""
     dim = 2 * features if sampling == BOTH else features
     mesh = None
@@ -48,7 +48,7 @@ def _sampled(n: Numbers, sampling: int, bent: bool, features: int = 3, **pose: A
 
 
 def _case(name: str, title: str, sampling: int, bent: bool, **pose: Any) -> None:
-    def build(n: Numbers) -> Image:
+    def build(n: Numbers) -> Picture:
         return _sampled(n, sampling, bent, **pose)
 
     CASES[name] = Valid(title, ("sampling: node",), build, [WHOLE, CLOSE])
@@ -62,7 +62,7 @@ _case("node-local-turned", "Local features of a turned layer", LOCAL, False, **T
 _case("node-global-bent", "Global features of a bent layer", GLOBAL, True)
 
 
-def _few(n: Numbers) -> Image:
+def _few(n: Numbers) -> Picture:
     return _sampled(n, BOTH, False, features=1)
 
 
@@ -71,7 +71,7 @@ CASES["node-few"] = Valid(
 )
 
 
-def _shared(n: Numbers) -> Image:
+def _shared(n: Numbers) -> Picture:
     image = _sampled(n, GLOBAL, False)
     shape = polygon((1, 1), (9, 2), (4, 8))
     copy = layer("copy", (0, 0, 9, 9), image.layers[1].texture, shape)

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from proxyimg_codec.codec.write import to_bytes
 from proxyimg_codec.container import tree, undo
 from proxyimg_codec.container.chunks import Chunk, read, write
 from proxyimg_codec.container.fields import pack
 from proxyimg_codec.geometry.pose import Pose
-from proxyimg_codec.image import Image, Layers
+from proxyimg_codec.model import Layers, Picture
+from proxyimg_codec.texture.implicit import ImplicitTexture
 
 from .bent import CLOSE, TURN, UNIT
 from .builders import (
@@ -35,7 +37,7 @@ _case = CASES.case
 
 
 def _affine(name: str, title: str, matrix: Sequence[int], shift: tuple[int, int]) -> None:
-    def build(n: Numbers) -> Image:
+    def build(n: Numbers) -> Picture:
         a, b, c, d = matrix
         return on_back(n, disc(n, matrix=(a, b, c, d), shift=shift))
 
@@ -53,7 +55,7 @@ _affine("pressed", "Pressed to a quarter and stretched", (UNIT // 4, 0, 0, UNIT 
 
 @_case("A moved layer with a control point that is clamped before it is mapped",
        "pose: affine", "outline: clamping")  # fmt: skip
-def _clamped(n: Numbers) -> Image:
+def _clamped(n: Numbers) -> Picture:
     far = polygon((4, 4), (1 << 21, 1 << 20), (3, 12), unit=0)
     pose = Pose(shift=(-1024, 512))
     return on_back(n, layer("far", (0, 0, *SIZE), texture(n), far, unit=0, pose=pose))
@@ -61,14 +63,14 @@ def _clamped(n: Numbers) -> Image:
 
 @_case("A back layer without boundary is turned: its outline is the turned canvas",
        "outline: the whole canvas", renders=[WHOLE, CLOSE])  # fmt: skip
-def _turned_back(n: Numbers) -> Image:
+def _turned_back(n: Numbers) -> Picture:
     image = on_back(n, disc(n))
     back = replace(image.layers[0], pose=Pose(**TURN))
     return replace(image, opaque=False, layers=Layers([back, image.layers[1]]))
 
 
 @_case("Layers of less than full opacity, one of them with alpha", "pose: opacity")
-def _opacity(n: Numbers) -> Image:
+def _opacity(n: Numbers) -> Picture:
     image = layered(n, channels=4)
     shares = (65535, 40000, 123)
     layers = [
@@ -80,14 +82,14 @@ def _opacity(n: Numbers) -> Image:
 
 @_case("A hidden layer is drawn only if it is asked for", "pose: hidden",
        renders=[WHOLE, {"layers": ["disc"]}, {"layers": ["triangle", "disc"]}])  # fmt: skip
-def _hidden(n: Numbers) -> Image:
+def _hidden(n: Numbers) -> Picture:
     image = layered(n)
     hidden = replace(image.layers[1], pose=Pose(hidden=True))
     return replace(image, layers=Layers([image.layers[0], hidden, image.layers[2]]))
 
 
 @_case("All layers are hidden: an empty picture", "pose: hidden")
-def _all_hidden(n: Numbers) -> Image:
+def _all_hidden(n: Numbers) -> Picture:
     shape = ellipse((4, 4), (3, 3))
     only = layer("disc", (0, 0, 8, 8), texture(n), shape, pose=Pose(hidden=True))
     return picture((8, 8), [only], network(n), opaque=False)
@@ -97,7 +99,7 @@ _MIX = (1500, 3000, -900, 700, -2500, 6000, 1000, 200, 300, -4000, 5000, 1500)
 
 
 @_case("Colour matrices, whose results are clamped", "pose: colour matrix")
-def _colours(n: Numbers) -> Image:
+def _colours(n: Numbers) -> Picture:
     image = replace(layered(n), networks=(network(n, contrast=1.5),))
     back = replace(image.layers[0], pose=Pose(colour=(0, 4096, 0, 0, 0, 0, 4096, 0, 4096, 0, 0, 0)))
     mixed = replace(image.layers[1], pose=Pose(colour=_MIX))
@@ -107,7 +109,7 @@ def _colours(n: Numbers) -> Image:
 
 @_case("Colour matrices and opacity on layers with alpha", "pose: colour matrix", "pose: opacity",
        "alpha")  # fmt: skip
-def _colours_alpha(n: Numbers) -> Image:
+def _colours_alpha(n: Numbers) -> Picture:
     image = layered(n, channels=4)
     poses = Pose(colour=_MIX), Pose(colour=_MIX[::-1], opacity=50001), Pose(colour=_MIX)
     layers = [replace(v, pose=p) for v, p in zip(image.layers, poses, strict=True)]
@@ -115,7 +117,7 @@ def _colours_alpha(n: Numbers) -> Image:
 
 
 @_case("Layers that show the texture of another in boxes of their own", "texture: shared")
-def _shared(n: Numbers) -> Image:
+def _shared(n: Numbers) -> Picture:
     image = layered(n)
     back, original, _ = image.layers
     shown = original.texture
@@ -130,21 +132,21 @@ def _shared(n: Numbers) -> Image:
 
 @_case("Texture displacements move what shows and not the outline", "pose: texture displacements",
        renders=[WHOLE, CLOSE])  # fmt: skip
-def _texture_displaced(n: Numbers) -> Image:
+def _texture_displaced(n: Numbers) -> Picture:
     mesh = grid_mesh((2, 1), 5, 4, split=[[3, 8, 9, 21]])
     return on_back(n, disc(n, mesh, places=bend(n, mesh, 70)))
 
 
 @_case("Both kinds of displacements, and an affine map", "pose: texture displacements",
        "pose: order", renders=[WHOLE, CLOSE])  # fmt: skip
-def _all_displaced(n: Numbers) -> Image:
+def _all_displaced(n: Numbers) -> Picture:
     mesh = grid_mesh((2, 1), 5, 4)
     return on_back(n, disc(n, mesh, nodes=bend(n, mesh), places=bend(n, mesh, 70), **TURN))
 
 
 @_case("The back layer of an opaque picture: other colours, and its texture displaced", "opaque",
        "pose: texture displacements", renders=[WHOLE, {"background": False}])  # fmt: skip
-def _opaque_posed(n: Numbers) -> Image:
+def _opaque_posed(n: Numbers) -> Picture:
     mesh = grid_mesh((-1, -1), 2, 2, step=(832, 640))
     image = on_back(n, disc(n))
     pose = Pose(places=bend(n, mesh, 60), colour=_MIX)
@@ -154,16 +156,18 @@ def _opaque_posed(n: Numbers) -> Image:
 
 @_case("Networks with and without alpha in a picture that is opaque all the same", "opaque",
        "networks: channels", "alpha", renders=[WHOLE, {"background": False}])  # fmt: skip
-def _mixed_channels(n: Numbers) -> Image:
+def _mixed_channels(n: Numbers) -> Picture:
     image = on_back(n, disc(n))
     clear = network(n, channels=4, contrast=1.5)
-    glass = replace(image.layers[1], texture=replace(image.layers[1].texture, network=1))
+    texture = image.layers[1].texture
+    assert isinstance(texture, ImplicitTexture)
+    glass = replace(image.layers[1], texture=replace(texture, network=1))
     layers = Layers([image.layers[0], glass])
     return replace(image, channels=4, networks=(*image.networks, clear), layers=layers)
 
 
 @_case("A mesh that nothing needs", "mesh: at rest")
-def _at_rest(n: Numbers) -> Image:
+def _at_rest(n: Numbers) -> Picture:
     return on_back(n, disc(n, grid_mesh((2, 1), 5, 4, split=[[3, 8, 9, 21]])))
 
 
@@ -180,7 +184,7 @@ def _tree(n: Numbers) -> bytes:
     moved = replace(image.layers[1], pose=Pose(**TURN))
     image = replace(image, layers=Layers([image.layers[0], moved, image.layers[2]]))
     values = {"groups": ["all", "some"], "parents": [0, 5, 2, 0, 4]}
-    return _with(image.to_bytes(), Chunk(tree.TYPE, pack(tree.FIELDS, values)))
+    return _with(to_bytes(image), Chunk(tree.TYPE, pack(tree.FIELDS, values)))
 
 
 def _history(state: bytes, history: bytes, size: int) -> Chunk:
@@ -190,7 +194,7 @@ def _history(state: bytes, history: bytes, size: int) -> Chunk:
 
 @_case("A history of one edit does not change the picture", "CHK-20", "MET-13", "MET-15")
 def _undo(n: Numbers) -> bytes:
-    data = layered(n).to_bytes()
+    data = to_bytes(layered(n))
     present = read(data)[:-1]
     # No chunks, and one step "{}" that refers to all chunks, in one raw zstd block.
     count = len(present)
@@ -202,25 +206,25 @@ def _undo(n: Numbers) -> bytes:
 
 @_case("A history of another picture is ignored, whatever it holds", "CHK-20", "MET-14")
 def _undo_stale(n: Numbers) -> bytes:
-    return _with(layered(n).to_bytes(), _history(bytes(32), b"rubbish", 7))
+    return _with(to_bytes(layered(n)), _history(bytes(32), b"rubbish", 7))
 
 
 @_case("A file of version 0.1, of maps", "file: version", "fields: maps")
 def _version_0_1(n: Numbers) -> bytes:
-    return with_maps(layered(n).to_bytes(), (0, 1))
+    return with_maps(to_bytes(layered(n)), (0, 1))
 
 
 @_case("A file of version 0.2, of maps, with a mesh and a pose", "file: version", "fields: maps")
 def _version_0_2(n: Numbers) -> bytes:
     mesh = grid_mesh((2, 1), 5, 4)
-    return with_maps(on_back(n, disc(n, mesh, nodes=bend(n, mesh))).to_bytes(), (0, 2))
+    return with_maps(to_bytes(on_back(n, disc(n, mesh, nodes=bend(n, mesh)))), (0, 2))
 
 
 @_case("A file of version 0.3 with maps, but arrays in the layers", "file: version", "fields: maps")
 def _version_0_3(n: Numbers) -> bytes:
-    return with_maps(layered(n).to_bytes(), (0, 3), without=["LAYR"])
+    return with_maps(to_bytes(layered(n)), (0, 3), without=["LAYR"])
 
 
 @_case("A file of version 0.2 with arrays", "file: version", "fields: maps")
 def _arrays_0_2(n: Numbers) -> bytes:
-    return write(read(layered(n).to_bytes()), (0, 2))
+    return write(read(to_bytes(layered(n))), (0, 2))

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from proxyimg_codec.geometry.boundary import Boundary
 from proxyimg_codec.geometry.pose import REST, Pose
-from proxyimg_codec.image import Image, Layer, Layers
-from proxyimg_codec.texture.cuts import Cuts
+from proxyimg_codec.model import Layer, Layers, Picture
 from proxyimg_codec.texture.implicit import Box
+from proxyimg_codec.texture.occlusion import Occlusion
 from proxyimg_codec.texture.pyramid import PyramidTexture
 
 from .bent import CLOSE, TURN
@@ -43,7 +43,7 @@ RING = ellipse((12, 9), (7, 5.5))
 
 def objects(
     back: PyramidTexture, front: PyramidTexture, pose: Pose = REST, opaque: bool = True
-) -> Image:
+) -> Picture:
     """A disc over a back layer, each with a view, the disc posed."""
     box = 4, 3, 16, 12
     return picture(
@@ -75,7 +75,7 @@ def _cells(inside: _Mask, cell: int) -> _Mask:
 
 @_case("Two layers show parts of the same planes, one of them moved: the fill shows",
        "pyramid: mask", "pyramid: fill", renders=[WHOLE, CLOSE, {"background": False}])  # fmt: skip
-def _pyramid_moved(n: Numbers) -> Image:
+def _pyramid_moved(n: Numbers) -> Picture:
     source, box = coded(n, SIZE, levels=3), (4, 3, 16, 12)
     back = view(source, cell=1, mask=_cells(~_inside((0, 0, *SIZE)), 1))
     front = view(source, part=box, mask=_inside(box))
@@ -84,7 +84,7 @@ def _pyramid_moved(n: Numbers) -> Image:
 
 @_case("Masks of cells that the part cuts off, with alpha", "pyramid: mask", "pyramid: alpha",
        renders=[WHOLE, CLOSE])  # fmt: skip
-def _pyramid_cells(n: Numbers) -> Image:
+def _pyramid_cells(n: Numbers) -> Picture:
     source, alpha = coded(n, SIZE), coded(n, SIZE, components=1)
     part = (3, 2, 17, 13)
     cells = n.integers(0, 1, (4, 5)) > 0
@@ -93,12 +93,12 @@ def _pyramid_cells(n: Numbers) -> Image:
     return objects(back, front, Pose(shift=(-2 * 1024, 700)), opaque=False)
 
 
-def _cut(n: Numbers, pose: Pose = REST) -> Image:
+def _cut(n: Numbers, pose: Pose = REST) -> Picture:
     """As `objects`, with views that the boundary of the disc cuts."""
     source, box = coded(n, SIZE, levels=3), (4, 3, 16, 12)
     ring = Boundary(4, (RING,))
-    back = view(source, cuts=Cuts.of([1], 0, [None, ring], (0, 0, *SIZE)))
-    front = view(source, part=box, cuts=Cuts.of([1], 1, [None, ring], box))
+    back = view(source, cuts=Occlusion.of([1], 0, [None, ring], (0, 0, *SIZE)))
+    front = view(source, part=box, cuts=Occlusion.of([1], 1, [None, ring], box))
     made = objects(back, front, pose)
     layers = list(made.layers)
     layers[1] = replace(layers[1], boundary=ring)
@@ -107,16 +107,16 @@ def _cut(n: Numbers, pose: Pose = REST) -> Image:
 
 @_case("Boundaries at rest tell which samples show", "pyramid: cuts",
        "pyramid: fill", renders=[WHOLE, CLOSE, {"layers": ["back"]}])  # fmt: skip
-def _pyramid_cuts(n: Numbers) -> Image:
+def _pyramid_cuts(n: Numbers) -> Picture:
     return _cut(n, Pose(shift=(6 * 1024, -3 * 1024 - 511)))
 
 
 @_case("Two layers in front have equal boundaries: the one that cuts stays, the other is moved",
        "pyramid: cuts", "pyramid: moved", renders=[{"layers": ["back"]}])  # fmt: skip
-def _pyramid_cuts_equal(n: Numbers) -> Image:
+def _pyramid_cuts_equal(n: Numbers) -> Picture:
     source, box, ring = coded(n, SIZE, levels=3), (4, 3, 16, 12), (RING,)
     shapes = None, Boundary(4, ring), Boundary(4, ring)
-    back = view(source, cuts=Cuts.of([2], 0, shapes, (0, 0, *SIZE)))
+    back = view(source, cuts=Occlusion.of([2], 0, shapes, (0, 0, *SIZE)))
     front = view(source, part=box)
     moved = Pose(shift=(6 * 1024, 2000))
     return picture(
@@ -131,7 +131,7 @@ def _pyramid_cuts_equal(n: Numbers) -> Image:
 
 @_case("Three layers of which two overlap, cut by each other", "pyramid: cuts",
        renders=[{"layers": [name]} for name in ("back", "disc", "triangle")])  # fmt: skip
-def _pyramid_cuts_several(n: Numbers) -> Image:
+def _pyramid_cuts_several(n: Numbers) -> Picture:
     source = coded(n, SIZE)
     shapes = None, Boundary(4, (RING,)), Boundary(4, (polygon((22, 2), (20, 16), (9, 10)),))
     boxes = (0, 0, *SIZE), (5, 3, 15, 12), (9, 2, 14, 15)
@@ -141,7 +141,7 @@ def _pyramid_cuts_several(n: Numbers) -> Image:
         [
             Layer(
                 name, box, shape,
-                view(source, part=box, cuts=Cuts.of(numbers[k], k, shapes, box)),
+                view(source, part=box, cuts=Occlusion.of(numbers[k], k, shapes, box)),
             )
             for k, (name, box, shape) in enumerate(
                 zip(("back", "disc", "triangle"), boxes, shapes, strict=True)
@@ -153,7 +153,7 @@ def _pyramid_cuts_several(n: Numbers) -> Image:
 _PIECES = [{"layers": [name]} for name in ("back", "disc", "bar")]
 
 
-def pieces(n: Numbers, poses: dict[str, Pose], copied: str = "") -> Image:
+def pieces(n: Numbers, poses: dict[str, Pose], copied: str = "") -> Picture:
     """A bar over a disc over a back layer, cut by each other, posed; then a copy of one."""
     size = 40, 30
     source = coded(n, size, levels=3)
@@ -165,7 +165,7 @@ def pieces(n: Numbers, poses: dict[str, Pose], copied: str = "") -> Image:
     boxes = (0, 0, *size), (5, 3, 26, 24), (10, 7, 28, 13)
     layers = []
     for k, name in enumerate(("back", "disc", "bar")):
-        cuts = Cuts.of([[1, 2], [1, 2], [2]][k], k, shapes, boxes[k])
+        cuts = Occlusion.of([[1, 2], [1, 2], [2]][k], k, shapes, boxes[k])
         shown = view(source, part=boxes[k], cuts=cuts)
         layers.append(Layer(name, boxes[k], shapes[k], shown, pose=poses.get(name, REST)))
     if copied:
@@ -176,13 +176,13 @@ def pieces(n: Numbers, poses: dict[str, Pose], copied: str = "") -> Image:
 
 @_case("A layer is moved away between two others: what is mixed with it does not show",
        "pyramid: cuts", "pyramid: moved", renders=[WHOLE, CLOSE, *_PIECES])  # fmt: skip
-def _pyramid_cuts_moved(n: Numbers) -> Image:
+def _pyramid_cuts_moved(n: Numbers) -> Picture:
     return pieces(n, {"disc": Pose(shift=(-4 * 1024, 2 * 1024 + 300))})
 
 
 @_case("Two layers are moved together: what they are mixed with of each other shows",
        "pyramid: cuts", "pyramid: moved", renders=[WHOLE, CLOSE, *_PIECES])  # fmt: skip
-def _pyramid_cuts_together(n: Numbers) -> Image:
+def _pyramid_cuts_together(n: Numbers) -> Picture:
     pose = Pose(matrix=(1 << 24, 1 << 21, 0, 1 << 24), shift=(1024, -3 * 1024))
     return pieces(n, {"disc": pose, "bar": pose})
 
@@ -190,21 +190,21 @@ def _pyramid_cuts_together(n: Numbers) -> Image:
 @_case("A layer that shines through, and a copy of it elsewhere", "pyramid: cuts",
        "pyramid: moved", "texture: shared",
        renders=[WHOLE, *_PIECES, {"layers": ["copy"]}])  # fmt: skip
-def _pyramid_cuts_opacity(n: Numbers) -> Image:
+def _pyramid_cuts_opacity(n: Numbers) -> Picture:
     return pieces(n, {"disc": Pose(opacity=40000), "copy": Pose(shift=(3 * 1024, 0))}, copied="bar")
 
 
 @_case("A hidden layer that is drawn alone, and a copy of it in its place", "pyramid: cuts",
        "pyramid: moved", "texture: shared",
        renders=[WHOLE, *_PIECES, {"layers": ["copy"]}])  # fmt: skip
-def _pyramid_cuts_hidden(n: Numbers) -> Image:
+def _pyramid_cuts_hidden(n: Numbers) -> Picture:
     colour = (4096, 0, 0, -300, 0, 3000, 0, 200, 0, 0, 4096, 0)
     return pieces(n, {"disc": Pose(hidden=True), "copy": Pose(colour=colour)}, copied="disc")
 
 
 @_case("A bent layer", "pyramid: cuts", "pyramid: moved", "pose: displacements",
        renders=[WHOLE, *_PIECES])  # fmt: skip
-def _pyramid_cuts_bent(n: Numbers) -> Image:
+def _pyramid_cuts_bent(n: Numbers) -> Picture:
     mesh = grid_mesh((9, 6), 5, 4)
     made = pieces(n, {"bar": Pose(nodes=bend(n, mesh))})
     layers = list(made.layers)
@@ -212,7 +212,7 @@ def _pyramid_cuts_bent(n: Numbers) -> Image:
     return replace(made, layers=Layers(layers))
 
 
-def _masked(made: Image, name: str, mask: _Mask, cell: int) -> Image:
+def _masked(made: Picture, name: str, mask: _Mask, cell: int) -> Picture:
     """A picture with a mask beside the cuts of a layer."""
     layers = list(made.layers)
     at = [v.name for v in layers].index(name)
@@ -228,7 +228,7 @@ def _masked(made: Image, name: str, mask: _Mask, cell: int) -> Image:
 
 @_case("A mask and cuts together", "pyramid: cuts", "pyramid: mask", "pyramid: fill",
        renders=[WHOLE, CLOSE, {"layers": ["back"]}, {"layers": ["disc"]}])  # fmt: skip
-def _pyramid_cuts_mask(n: Numbers) -> Image:
+def _pyramid_cuts_mask(n: Numbers) -> Picture:
     made = _cut(n, Pose(shift=(6 * 1024, -3 * 1024 - 511)))
     back = np.ones((9, 12), bool)
     back[2:5, 1:4] = False
@@ -238,16 +238,16 @@ def _pyramid_cuts_mask(n: Numbers) -> Image:
 
 @_case("A mask of what cuts take as a whole: all of the mask shows", "pyramid: cuts",
        "pyramid: mask", renders=[{"layers": ["back"]}])  # fmt: skip
-def _pyramid_cuts_mask_all(n: Numbers) -> Image:
+def _pyramid_cuts_mask_all(n: Numbers) -> Picture:
     return _masked(_cut(n), "back", _inside((-4, -3, *SIZE)) & _inside((4, 3, *SIZE)), 0)
 
 
-@_case("Cuts that leave nothing: all samples show", "pyramid: cuts",
+@_case("Occlusion that leave nothing: all samples show", "pyramid: cuts",
        renders=[{"layers": ["back"]}])  # fmt: skip
-def _pyramid_cuts_all(n: Numbers) -> Image:
+def _pyramid_cuts_all(n: Numbers) -> Picture:
     whole = Boundary(4, (polygon((-5, -5), (40, -5), (40, 40), (-5, 40)),))
     size = 10, 8
-    cuts = Cuts.of([1], 0, [None, whole], (0, 0, *size))
+    cuts = Occlusion.of([1], 0, [None, whole], (0, 0, *size))
     source = coded(n, size)
     back = layer("back", (0, 0, *size), view(source, cuts=cuts))
     front = Layer("front", (0, 0, *size), whole, view(source, part=(0, 0, 5, 4)))
@@ -256,7 +256,7 @@ def _pyramid_cuts_all(n: Numbers) -> Image:
 
 @_case("A bent and turned layer", "pyramid: sampling", "pose: displacements",
        renders=[WHOLE, CLOSE])  # fmt: skip
-def _pyramid_bent(n: Numbers) -> Image:
+def _pyramid_bent(n: Numbers) -> Picture:
     mesh = grid_mesh((2, 1), 5, 4)
     source, box = coded(n, SIZE), (4, 3, 16, 12)
     made = objects(view(source), view(source, part=box), Pose(nodes=bend(n, mesh), **TURN))
@@ -267,7 +267,7 @@ def _pyramid_bent(n: Numbers) -> Image:
 
 @_case("A layer that shows the view of another, in a box and with a mask and cuts of that",
        "texture: shared", "pyramid: cuts")  # fmt: skip
-def _pyramid_shared(n: Numbers) -> Image:
+def _pyramid_shared(n: Numbers) -> Picture:
     made = _cut(n)
     back, front = made.layers
     shape: Path = polygon((1, 1), (11, 2), (9, 8), (2, 7))
@@ -277,7 +277,7 @@ def _pyramid_shared(n: Numbers) -> Image:
 
 
 @_case("Implicit and pyramid textures in one picture", "texture: coders", "pyramid: planes")
-def _pyramid_mixed(n: Numbers) -> Image:
+def _pyramid_mixed(n: Numbers) -> Picture:
     first, second = coded(n, (9, 8)), coded(n, (16, 12), levels=3)
     return picture(
         SIZE,

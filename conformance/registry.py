@@ -6,12 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from proxyimg_codec.image import Image
+from proxyimg_codec.model import Picture
 
 from .builders import Numbers
 
 Args = Mapping[str, Any]
-Build = Callable[[Numbers], Image | bytes]
+Build = Callable[[Numbers], Picture | bytes]
 WHOLE: Args = {}
 """Arguments of the plainest render."""
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from proxyimg_codec.geometry.pose import Pose
-from proxyimg_codec.image import Image
+from proxyimg_codec.model import Picture
 
 from .bent import CLOSE, TURN
 from .builders import (
@@ -40,7 +40,7 @@ MIX = (4096, -900, 300, 200, 0, 3000, 1000, 0, 500, 0, 4096, -200)
 
 def _sampled(
     n: Numbers, sampling: int, *, mesh: bool, masked: bool = False, **pose: Any
-) -> tuple[Image, dict[str, Any]]:
+) -> tuple[Picture, dict[str, Any]]:
     """A ring on a back layer that are sampled in the same way; and the mesh of the ring."""
     dim = 6 if sampling == BOTH else 4
     features = dim // 2 if sampling == BOTH else dim
@@ -86,7 +86,7 @@ def _masked(sampling: int) -> Build:
 
 
 def _moving(sampling: int) -> Build:
-    def build(n: Numbers) -> Image:
+    def build(n: Numbers) -> Picture:
         image, meshes = _sampled(n, sampling, mesh=True)
         still = [replace(v, pose=Pose()) for v in image.layers]
         image = replace(image, layers=type(image.layers)(still))

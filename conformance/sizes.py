@@ -8,7 +8,7 @@ import numpy as np
 
 from proxyimg_codec.geometry.pose import Pose
 from proxyimg_codec.geometry.track import Track
-from proxyimg_codec.image import Image
+from proxyimg_codec.model import Picture
 
 from .builders import (
     SIZE,
@@ -35,7 +35,7 @@ LONG = 4096
 def _thin(size: tuple[int, int], sampling: int) -> Build:
     """A canvas one pixel wide or high, sampled directly or at the nodes of meshes."""
 
-    def build(n: Numbers) -> Image:
+    def build(n: Numbers) -> Picture:
         w, h = size
         dim = 3 * (1 + sampling)
         # Two by two cells of 16 steps, a bit larger than the canvas.
@@ -76,7 +76,7 @@ CASES["pixel-node"] = Valid(
 def _large(w: int, h: int) -> Build:
     """A large canvas with a disc at its end."""
 
-    def build(n: Numbers) -> Image:
+    def build(n: Numbers) -> Picture:
         shape = ellipse((w - 12, h - 9), (11, 8.5), unit=5)
         back = layer("back", (0, 0, w, h), texture(n, grid=(9, 8)))
         return picture((w, h), [back, layer("end", (w - 24, h - 18, 24, 18), texture(n), shape,
@@ -96,7 +96,7 @@ for _level, _wide, _high in ((2, 1 << 14, 12_000), (3, 1 << 20, 250)):
 
 @_case("65 layers, most of which are hidden", "LEV-1", "LEV-3", "SEC-2", "pose: hidden",
        renders=[WHOLE, {"layers": ["part 7", "part 49"]}], name="level-2-posed")  # fmt: skip
-def _many_layers(n: Numbers) -> Image:
+def _many_layers(n: Numbers) -> Picture:
     shown = texture(n)
     shape = polygon((1, 1), (5, 2), (2, 5))
     shifts = [((k * 1024 * 7) % 18_000, (k * 1024 * 5) % 13_000) for k in range(64)]
@@ -110,7 +110,7 @@ def _many_layers(n: Numbers) -> Image:
 
 @_case("64 networks, and layers that use some of them", "LEV-1", "LEV-3", "SEC-2",
        "networks: several", name="level-3-posed")  # fmt: skip
-def _many_networks(n: Numbers) -> Image:
+def _many_networks(n: Numbers) -> Picture:
     shape = polygon((1, 1), (9, 2), (3, 8))
     back = layer("back", (0, 0, *SIZE), texture(n, dim=1, network=40))
     parts = [
@@ -124,7 +124,7 @@ def _many_networks(n: Numbers) -> Image:
 
 @_case("Four curves of 16,400 coefficients each", "LEV-1", "LEV-3", "SEC-2", "MOT-3", "MOT-6",
        renders=[WHOLE, {"time": 1799.91}, {"time": 0.2}], name="level-2-moving")  # fmt: skip
-def _long_timeline(n: Numbers) -> Image:
+def _long_timeline(n: Numbers) -> Picture:
     mesh = grid_mesh((2, 1), 3, 3)
     line = replace(LOOP, duration=3_600_000, intervals=16_400)
     curves = np.zeros((4, line.coefficients), np.int64)

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from proxyimg_codec import errors
-from proxyimg_codec.image import from_bytes
+from proxyimg_codec import errors, from_bytes
 
 
 def digest(data: bytes) -> str:

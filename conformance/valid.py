@@ -8,11 +8,12 @@ from unittest import mock
 
 import numpy as np
 
+from proxyimg_codec.codec.write import to_bytes
 from proxyimg_codec.container.chunks import Chunk, read, write
 from proxyimg_codec.container.fields import pack
 from proxyimg_codec.container.meta import BLOCKS, FIELDS
 from proxyimg_codec.entropy import arrays, rans
-from proxyimg_codec.image import Image
+from proxyimg_codec.model import Picture
 
 from .builders import (
     Numbers,
@@ -32,19 +33,19 @@ _case = CASES.case
 
 @_case("One opaque layer without boundary", "file", "entropy", "coverage: none",
        "texture: bilinear", "network", "render: whole", "MET-1")  # fmt: skip
-def _one_layer(n: Numbers) -> Image:
+def _one_layer(n: Numbers) -> Picture:
     back = layer("back", (0, 0, 24, 20), texture(n, grid=(6, 5)))
     return picture((24, 20), [back], network(n, octaves=2, depth=2))
 
 
 @_case("Three layers that overlap", "compositing: order", "boundary: coding", "coverage: edges",
        "coverage: curves")  # fmt: skip
-def _layers(n: Numbers) -> Image:
+def _layers(n: Numbers) -> Picture:
     return layered(n)
 
 
 @_case("A ring: the inner path runs the other way", "coverage: hole", "coverage: nonzero")
-def _hole(n: Numbers) -> Image:
+def _hole(n: Numbers) -> Picture:
     outer = ellipse((16, 12), (13, 10.5))
     inner = ellipse((17.5, 12), (6.25, 5), reverse=True)
     back = layer("back", (0, 0, 32, 24), texture(n))
@@ -54,7 +55,7 @@ def _hole(n: Numbers) -> Image:
 
 @_case("Paths that overlap and run the same way, and one that runs the other way around nothing",
        "coverage: nonzero", "coverage: clamping")  # fmt: skip
-def _winding(n: Numbers) -> Image:
+def _winding(n: Numbers) -> Picture:
     paths = (
         polygon((2, 2), (20, 2), (20, 15), (2, 15)),
         polygon((10, 8), (28, 8), (28, 21), (10, 21)),
@@ -66,7 +67,7 @@ def _winding(n: Numbers) -> Image:
 
 
 @_case("A layer of two components", "coverage: components")
-def _components(n: Numbers) -> Image:
+def _components(n: Numbers) -> Picture:
     paths = ellipse((7, 8), (5, 6)), polygon((18, 3), (29, 9), (20, 21), (15, 13))
     back = layer("back", (0, 0, 32, 24), texture(n))
     return picture((32, 24), [back, layer("two", (1, 2, 29, 20), texture(n), *paths)], network(n))
@@ -74,7 +75,7 @@ def _components(n: Numbers) -> Image:
 
 @_case("Paths that lie on the border of the canvas, and one that leaves it on every side",
        "coverage: border", "coverage: outside the canvas")  # fmt: skip
-def _border(n: Numbers) -> Image:
+def _border(n: Numbers) -> Picture:
     w, h = 28, 20
     frame = polygon((0, 0), (w, 0), (w, h), (0, h)), ellipse((14, 10), (9, 7), reverse=True)
     cross = ellipse((0, 3), (6, 8)), ellipse((30, 19.5), (9, 7)), polygon((9, -9), (12, 9), (8, 33))
@@ -90,7 +91,7 @@ def _border(n: Numbers) -> Image:
 
 
 @_case("Deltas of 15 bits and more, in units of 1/64 pixel", "boundary: escape", "boundary: unit")
-def _escape(n: Numbers) -> Image:
+def _escape(n: Numbers) -> Picture:
     far = polygon((-900, 8), (2000.5, -700), (12, 14), (1500, 900.25), unit=6)
     back = layer("back", (0, 0, 32, 24), texture(n))
     shape = layer("far", (0, 0, 32, 24), texture(n), far, unit=6)
@@ -98,27 +99,27 @@ def _escape(n: Numbers) -> Image:
 
 
 @_case("A box smaller than the layer: beyond it the rim goes on", "texture: rim", "boundary: unit")
-def _rim(n: Numbers) -> Image:
+def _rim(n: Numbers) -> Picture:
     disc = layer("disc", (12, 9, 7, 5), texture(n), ellipse((15, 11), (14, 10), unit=0), unit=0)
     return picture((32, 24), [layer("back", (5, -4, 40, 20), texture(n)), disc], network(n))
 
 
 @_case("Four outputs: layers with alpha that overlap", "alpha", "compositing: alpha",
        renders=[WHOLE, {"background": False}, {"width": 13}])  # fmt: skip
-def _alpha(n: Numbers) -> Image:
+def _alpha(n: Numbers) -> Picture:
     return layered(n, channels=4)
 
 
 @_case("Three outputs and no opaque back layer", "alpha: from coverage alone",
        renders=[WHOLE, {"background": False}])  # fmt: skip
-def _no_back(n: Numbers) -> Image:
+def _no_back(n: Numbers) -> Picture:
     image = layered(n)
     return replace(image, opaque=False, layers=type(image.layers)(image.layers[1:]))
 
 
 @_case("Few codes stored, the others filled; steps so large that the fill's rounding shows",
        "texture: mask", "texture: diffusion", "entropy: masks")  # fmt: skip
-def _diffusion(n: Numbers) -> Image:
+def _diffusion(n: Numbers) -> Picture:
     sparse = n.integers(0, 5, (9, 13)) == 0
     few, one = np.zeros((14, 18), bool), np.zeros((7, 6), bool)
     few[(4, 4, 5, 6, 9), (4, 5, 4, 5, 9)] = one[4, 1] = True
@@ -135,7 +136,7 @@ def _diffusion(n: Numbers) -> Image:
 
 
 def _bits(bits: int) -> Build:
-    def build(n: Numbers) -> Image:
+    def build(n: Numbers) -> Picture:
         back = layer("back", (0, 0, 14, 12), texture(n, grid=(7, 5), bits=bits))
         return picture((14, 12), [back], network(n, bits=bits))
 
@@ -150,7 +151,7 @@ for _b in range(2, 9):
 
 
 @_case("A large plane of mostly equal codes", "entropy: halving of counts", "entropy: lanes")
-def _adaptation(n: Numbers) -> Image:
+def _adaptation(n: Numbers) -> Picture:
     plane = texture(n, grid=(48, 40), bits=2)
     rare = n.integers(0, 15, plane.codes.shape) == 0
     plane = replace(plane, codes=np.where(rare, plane.codes, np.int8(-1)))
@@ -162,11 +163,11 @@ def _lanes(n: Numbers) -> bytes:
     back = layer("back", (0, 0, 16, 12), texture(n, dim=24, grid=(4, 3)))
     made = picture((16, 12), [back], network(n, dim=24, octaves=0))
     with mock.patch.object(arrays, "Encoder", partial(rans.Encoder, 5)):
-        return made.to_bytes()
+        return to_bytes(made)
 
 
 @_case("Layers with networks of different sizes", "networks: several", "network: depth and width")
-def _networks(n: Numbers) -> Image:
+def _networks(n: Numbers) -> Picture:
     sizes = [
         {"dim": 3, "octaves": 1, "hidden": 6, "depth": 1},
         {"dim": 1, "octaves": 2, "hidden": 3, "depth": 8},
@@ -185,13 +186,13 @@ def _networks(n: Numbers) -> Image:
 
 
 @_case("No frequency encoding", "network: octaves")
-def _octaves_0(n: Numbers) -> Image:
+def _octaves_0(n: Numbers) -> Picture:
     back = layer("back", (0, 0, 16, 12), texture(n, reach=1.5))
     return picture((16, 12), [back], network(n, octaves=0))
 
 
 @_case("Seven octaves, and features far beyond one turn", "network: octaves")
-def _octaves_7(n: Numbers) -> Image:
+def _octaves_7(n: Numbers) -> Picture:
     back = layer("back", (0, 0, 16, 12), texture(n, dim=2, grid=(3, 2), reach=3.0))
     return picture((16, 12), [back], network(n, dim=2, octaves=7, hidden=8))
 
@@ -199,7 +200,7 @@ def _octaves_7(n: Numbers) -> Image:
 @_case("Unknown ancillary chunks in every place", "chunks: ancillary")
 def _ancillary(n: Numbers) -> bytes:
     out = []
-    for i, chunk in enumerate(read(layered(n).to_bytes())):
+    for i, chunk in enumerate(read(to_bytes(layered(n)))):
         out += [Chunk(("teSt", "prIv", "zzZZ")[i % 3], bytes(range(i)))] if i else []
         out.append(chunk)
     return write(out)
@@ -209,7 +210,7 @@ def _ancillary(n: Numbers) -> bytes:
 def _metadata(n: Numbers) -> bytes:
     image = picture((8, 8), [layer("back", (0, 0, 8, 8), texture(n))], network(n))
     info = {"encoder": "conformance", "settings": '{"a": 1}', "areas": [64]}
-    chunks = read(replace(image, info=info).to_bytes())
+    chunks = read(to_bytes(replace(image, info=info)))
     blocks = {"icc": bytes(132), "exif": b"II*\0\x08\0\0\0\0\0\0\0", "xmp": b"<x:xmpmeta/>"}
     return write([*chunks[:-2], *(_block(k, v) for k, v in blocks.items()), *chunks[-2:]])
 

@@ -18,14 +18,13 @@ from unittest.mock import patch
 import msgpack
 import numpy as np
 
-from proxyimg_codec import image
 from proxyimg_codec.cli import decode
 from proxyimg_codec.container import chunks, fields, file
 from proxyimg_codec.entropy import arrays, rans
 from proxyimg_codec.errors import FormatError
 from proxyimg_codec.geometry import coverage, deltas
 from proxyimg_codec.io import raster
-from proxyimg_codec.render import compose, view
+from proxyimg_codec.render import compose, pixels, view
 from proxyimg_codec.texture import diffusion, implicit, network
 
 from .wrong_motion import FAULTS as FAULTS_OF_MOTION
@@ -63,14 +62,14 @@ def _straight(tile: Any, solid: bool, dtype: Any) -> Any:
 
 
 def _opaque(tile: Any, solid: bool, dtype: Any) -> Any:
-    pixels = finish_of(tile, solid, dtype)
-    pixels[..., 3:] = np.iinfo(dtype).max
-    return pixels
+    done = finish_of(tile, solid, dtype)
+    done[..., 3:] = np.iinfo(dtype).max
+    return done
 
 
-def _writing_nan(path: str, pixels: Any, *_: Any) -> None:
+def _writing_nan(path: str, samples: Any, *_: Any) -> None:
     with open(path, "wb") as out:
-        np.save(out, np.full(pixels.shape, np.nan, np.float32))
+        np.save(out, np.full(samples.shape, np.nan, np.float32))
 
 
 def _lenient_halves(data: bytes, count: int, *_: Any, **__: Any) -> Any:
@@ -132,8 +131,8 @@ def _obliging(argv: list[str]) -> int:
 
 
 coverage_of, taps_of, read_of = coverage.coverage, implicit.taps, chunks.read
-finish_of, write_of, fields_of, main_of = image._finish, raster.write, fields.unpack, decode.main
-premultiplied_of, render_of, select_of = compose.premultiplied, compose.render, image.Image._select
+finish_of, write_of, fields_of, main_of = pixels._finished, raster.write, fields.unpack, decode.main
+premultiplied_of, compose_of, selected_of = compose.premultiplied, compose.compose, pixels.selected
 
 _Coverage = Callable[..., Any]
 
@@ -145,8 +144,8 @@ def _coverage(function: _Coverage) -> list[Patch]:
 FAULTS: dict[str, list[Patch]] = {
     "half-pixel": [(view, "_centres", lambda origin, start, stop, pitch:
         np.arange(start, stop, dtype=np.float64) * pitch + origin)],
-    "layer-order": [(image, "render", lambda i, v, layers, *rest:
-        render_of(i, v, layers[::-1], *rest))],
+    "layer-order": [(pixels, "compose", lambda p, v, layers, *rest:
+        compose_of(p, v, layers[::-1], *rest))],
     "ignores-holes": _coverage(_ignoring_holes),
     "even-odd": _coverage(_even_odd),
     "hard-edges": _coverage(lambda *a: (coverage_of(*a) > coverage.FULL // 2) * coverage.FULL),
@@ -156,8 +155,8 @@ FAULTS: dict[str, list[Patch]] = {
     "escape-narrow": [(deltas, "_ESCAPE", 16)],
     "swaps-channels": [(compose, "premultiplied", lambda out:
         premultiplied_of(out)[:, [2, 1, 0, 3]])],
-    "not-premultiplied": [(image, "_finish", _straight)],
-    "drops-alpha": [(image, "_finish", _opaque)],
+    "not-premultiplied": [(pixels, "_finished", _straight)],
+    "drops-alpha": [(pixels, "_finished", _opaque)],
     "zeros-for-diffusion": [(implicit, "fill", lambda codes, stored:
         np.where(stored, codes.astype(np.int32) << diffusion.FRACTION_BITS, 0))],
     "no-smoothing": [(diffusion, "SWEEPS", 0)],
@@ -165,10 +164,10 @@ FAULTS: dict[str, list[Patch]] = {
     "no-octaves": [(network, "encode_features", lambda f, octaves:
         np.tile(f, (1, 2 * octaves + 1)))],
     "no-averaging": [(view.View, "supersampling", (1, 1))],
-    "keeps-background": [(image.Image, "_select", lambda self, layers, _:
-        select_of(self, layers, True))],
-    "ignores-layers": [(image.Image, "_select", lambda self, _, background:
-        select_of(self, None, background))],
+    "keeps-background": [(pixels, "selected", lambda image, layers, _:
+        selected_of(image, layers, True))],
+    "ignores-layers": [(pixels, "selected", lambda image, _, background:
+        selected_of(image, None, background))],
     "ignores-region": [(decode, "parse_region", lambda text: None)],
     "no-halving": [(arrays, "COUNT_LIMIT", 1 << 30)],
     "nan": [(raster, "write", _writing_nan)],

@@ -8,13 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from proxyimg_codec import image
+from proxyimg_codec import api
+from proxyimg_codec.codec import read
 from proxyimg_codec.container import check, file
+from proxyimg_codec.container.content import Container
 from proxyimg_codec.geometry import deltas, track, warp
 from proxyimg_codec.geometry.boundary import Boundary
 from proxyimg_codec.geometry.mesh import Refined
 from proxyimg_codec.geometry.pose import REST, Pose
 from proxyimg_codec.geometry.track import SUM, Timeline, Track
+from proxyimg_codec.model import Layers, Picture, Pictured
+from proxyimg_codec.render import moment, neighbours, pixels
 
 from .wrong_poses import Patch
 
@@ -88,21 +92,26 @@ def _riding_after(boundary: Any, posed: Pose, meshed: Any, size: Any) -> Any:
     return Boundary(10, tuple(a + b - c for a, b, c in paths))
 
 
-def _started(self: image.Image, *, t: float | None = None, **options: Any) -> Any:
-    return render_of(self, t=0 if t is None and self.timeline else t, **options)
+def _started(image: Pictured, *, t: float | None = None, **options: Any) -> Any:
+    return render_of(image, t=0 if t is None and image.picture.timeline else t, **options)
+
+
+def _moments(at: Callable[[Picture, float], Picture]) -> list[Patch]:
+    """Other pictures at a time."""
+    return [(api, "at", at), (pixels, "at", at)]
 
 
 def _posed(change: Callable[[int, Pose], dict[str, Any]]) -> list[Patch]:
     """Poses at a time that differ, by number of the layer."""
 
-    def at(self: image.Image, t: float) -> image.Image:
-        made = at_of(self, t)
+    def at(picture: Picture, t: float) -> Picture:
+        made = at_of(picture, t)
         layers = [
             replace(v, pose=replace(v.pose, **change(k, v.pose))) for k, v in enumerate(made.layers)
         ]
-        return replace(made, layers=image.Layers(layers))
+        return replace(made, layers=Layers(layers))
 
-    return [(image.Image, "at", at)]
+    return _moments(at)
 
 
 def _still_where_nothing_moves(_: int, posed: Pose) -> dict[str, Any]:
@@ -128,7 +137,7 @@ def _by_vertex(values: Any, *_: Any) -> Any:
     return np.cumsum(values, axis=0)
 
 
-def _first_meshes(*args: Any) -> file.Container:
+def _first_meshes(*args: Any) -> Container:
     c = parse_of(*args)
     if c.motion is None:
         return c
@@ -136,13 +145,13 @@ def _first_meshes(*args: Any) -> file.Container:
     return replace(c, motion={**c.motion, "layers": numbers})
 
 
-taps_of, decode_of, path_of, at_of = Timeline.taps, track.decode, Track.at, image.Image.at
+taps_of, decode_of, path_of, at_of = Timeline.taps, track.decode, Track.at, moment.at
 deltas_of, present_of, outline_of = deltas.decode, Pose.present, warp.outline
-parse_of, render_of = file.parse, image.Image.render
+parse_of, render_of = file.parse_within, pixels.render
 
 FAULTS: dict[str, list[Patch]] = {
-    "ignores-motion": [(image.Image, "at", lambda self, t: self)],
-    "moves-without-a-time": [(image.Image, "render", _started)],
+    "ignores-motion": _moments(lambda picture, t: picture),
+    "moves-without-a-time": [(pixels, "render", _started)],
     "linear-curves": [(track, "weights", _linear)],
     "curves-through-coefficients": [(track, "weights", _interpolating)],
     "stops-at-the-end": _times(lambda line, t: min(max(t, 0), line.seconds - 1e-6)
@@ -160,14 +169,15 @@ FAULTS: dict[str, list[Patch]] = {
     "first-shape-only": _tracks(lambda t: Track(t.curves[:1], t.shapes[:1])),
     "shapes-in-one-row": [(deltas, "decode", _one_row)],
     "shapes-without-midpoints": [(track, "restored", _by_vertex)],
-    "moves-the-first-meshes": [(file, "parse", _first_meshes)],
+    "moves-the-first-meshes": [(read, "parse_within", _first_meshes)],
     "ignores-unit": [(Track, "at", lambda self, line, t: path_of(self, replace(line, unit=4), t))],
     "x-for-y": [(Track, "at", _turned)],
     "motion-floored": [(Track, "at", _floored)],
     "motion-unclamped": [(track, "POINT_MAX", 1 << 50)],
     "forgets-bends": [(Pose, "displacements", property(lambda self:
         self.nodes << 6 if self.sway is None else self.sway))],
-    "moves-after-mapping": [(Pose, "present", _present_after), (warp, "outline", _riding_after)],
+    "moves-after-mapping": [(Pose, "present", _present_after),
+        (neighbours, "outline", _riding_after)],
     "still-where-nothing-moves": _posed(_still_where_nothing_moves),
     "bodies-apart": _posed(lambda k, posed: {"body": k}),
     "one-body": _posed(lambda k, posed: {"body": None if posed.sway is None else 0}),

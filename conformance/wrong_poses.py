@@ -8,12 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from proxyimg_codec import image
+from proxyimg_codec.codec import read
 from proxyimg_codec.container import check, chunks, file, undo
+from proxyimg_codec.container.content import Container
 from proxyimg_codec.geometry import mesh, pose, raster, warp
 from proxyimg_codec.geometry.boundary import Boundary
 from proxyimg_codec.geometry.pose import REST, Pose
-from proxyimg_codec.render import compose
+from proxyimg_codec.model import Layers, Picture
+from proxyimg_codec.render import compose, neighbours, pixels
 
 Patch = tuple[object, str, Any]
 """Object, attribute and what stands there instead."""
@@ -120,13 +122,13 @@ def _unclamped(self: Any, colour: Any) -> Any:
     return np.column_stack([mixed, colour[:, 3]]) * (shown.opacity / 65535)
 
 
-def _first_texture(*args: Any) -> file.Container:
+def _first_texture(*args: Any) -> Container:
     c = parse_of(*args)
     found = [{**t, "texture": 0} if t["coder"] == 0 else t for t in c.textures]
     return replace(c, textures=tuple(found))
 
 
-def _box_of_texture(*args: Any) -> file.Container:
+def _box_of_texture(*args: Any) -> Container:
     c = parse_of(*args)
     layers = [
         {**v, "box": c.layers[t.get("texture", i)]["box"]}
@@ -135,13 +137,13 @@ def _box_of_texture(*args: Any) -> file.Container:
     return replace(c, layers=tuple(layers))
 
 
-def _all_direct(*args: Any) -> file.Container:
+def _all_direct(*args: Any) -> Container:
     c = parse_of(*args)
     layers = [{**v, "sampling": v["sampling"] & 1} for v in c.layers]
     return replace(c, layers=tuple(layers))
 
 
-def _following_parents(*args: Any, **options: Any) -> image.Image:
+def _following_parents(*args: Any, **options: Any) -> Picture:
     made = from_bytes_of(*args, **options)
     above = {v.name: v for v in made.layers}
     moved = [
@@ -149,7 +151,7 @@ def _following_parents(*args: Any, **options: Any) -> image.Image:
         if v.parent in above else v
         for v in made.layers
     ]  # fmt: skip
-    return replace(made, layers=image.Layers(moved))
+    return replace(made, layers=Layers(moved))
 
 
 def _values_of_neighbours(residuals: Any, *_: Any) -> Any:
@@ -159,7 +161,7 @@ def _values_of_neighbours(residuals: Any, *_: Any) -> Any:
 outline_of, locate_of, rasterize_of = warp.outline, warp.Warp.locate, raster.rasterize
 pose_of, refine_of, ranked_of = pose.decode, mesh.refine, mesh._Border.ranked
 premultiplied_of, posed_of = compose.premultiplied, compose._Painter.posed
-parse_of, from_bytes_of, select_of = file.parse, image.from_bytes, image.Image._select
+parse_of, from_bytes_of, selected_of = file.parse_within, read.from_bytes, pixels.selected
 
 FAULTS: dict[str, list[Patch]] = {
     "ignores-poses": [(pose, "decode", lambda *a: REST)],
@@ -167,11 +169,11 @@ FAULTS: dict[str, list[Patch]] = {
     "ignores-texture-displacements": _posed(places=None),
     "ignores-opacity": _posed(opacity=65535),
     "ignores-colour": _posed(colour=()),
-    "bends-after-mapping": [(Pose, "present", _bent_after), (warp, "outline", _riding_after)],
-    "boundary-stays": [(warp, "outline", _staying)],
+    "bends-after-mapping": [(Pose, "present", _bent_after), (neighbours, "outline", _riding_after)],
+    "boundary-stays": [(neighbours, "outline", _staying)],
     "rides-floored": [(warp._Riders, "displacement", _rides_floored)],
     "boundary-undivided": [(warp, "divide", lambda path: path)],
-    "back-always-covers": [(warp, "outline", _never_a_rectangle)],
+    "back-always-covers": [(neighbours, "outline", _never_a_rectangle)],
     "maps-floored": [(Pose, "apply", _floored_map)],
     "maps-unclamped": [(pose, "POINT_MAX", 1 << 40)],
     "no-closing": [(mesh, "_close", lambda triangles, origin, *_: (triangles, origin))],
@@ -189,12 +191,12 @@ FAULTS: dict[str, list[Patch]] = {
         np.column_stack([out[:, :3], premultiplied_of(out)[:, 3]]))],
     "matrix-not-clamped": [(compose._Painter, "posed", _unclamped)],
     "draws-hidden": _posed(hidden=False),
-    "never-draws-hidden": [(image.Image, "_select", lambda self, layers, background:
-        [v for v in select_of(self, layers, background) if not v.pose.hidden])],
-    "shared-texture-of-the-back": [(file, "parse", _first_texture)],
-    "shared-box": [(file, "parse", _box_of_texture)],
-    "local-is-direct": [(file, "parse", _all_direct)],
-    "follows-parents": [(image, "from_bytes", _following_parents)],
+    "never-draws-hidden": [(pixels, "selected", lambda image, layers, background:
+        [v for v in selected_of(image, layers, background) if not v.pose.hidden])],
+    "shared-texture-of-the-back": [(read, "parse_within", _first_texture)],
+    "shared-box": [(read, "parse_within", _box_of_texture)],
+    "local-is-direct": [(read, "parse_within", _all_direct)],
+    "follows-parents": [(read, "from_bytes", _following_parents)],
     "believes-histories": [(undo, "digest", lambda *_: Anything())],
     "accepts-contradictions": [(check, "check", lambda *a: None)],
     "reads-only-0.9": [(chunks, "READABLE", ((0, 9),))],

@@ -12,9 +12,9 @@ from proxyimg_codec.entropy import laplace
 from proxyimg_codec.geometry.pose import Pose
 from proxyimg_codec.native import kernel
 from proxyimg_codec.render import compose
-from proxyimg_codec.texture import context, cuts, planes, pyramid, registered_model, synthesis
+from proxyimg_codec.texture import context, occlusion, planes, pyramid, registered_model, synthesis
 from proxyimg_codec.texture.context import LevelCoder
-from proxyimg_codec.texture.cuts import GONE, NOTHING, Apart, Cuts
+from proxyimg_codec.texture.occlusion import ALL_IN_PLACE, ALL_REMOVED, Moved, Occlusion
 from proxyimg_codec.texture.pyramid import PyramidTexture
 
 from .wrong_poses import Patch
@@ -130,18 +130,18 @@ def _opaque(*args: Any) -> PyramidTexture:
     return found if found.alpha is None else replace(found, alpha=None)
 
 
-def _unmixed(self: Cuts) -> Any:
+def _unmixed(self: Occlusion) -> Any:
     found = self._left(self.everything)
     return found if found.any() else ~found
 
 
-def _all_bare(*args: Any) -> Apart:
-    found = apart_of(*args)
-    return found._replace(behind=GONE) if found.behind else found
+def _all_bare(*args: Any) -> Moved:
+    found = moved_of(*args)
+    return found._replace(behind=ALL_REMOVED) if found.behind else found
 
 
-def _back_bares(*args: Any) -> Apart:
-    found = apart_of(*args)
+def _back_bares(*args: Any) -> Moved:
+    found = moved_of(*args)
     return found._replace(behind=tuple((b, s) for b, s in found.behind if not s))
 
 
@@ -153,7 +153,7 @@ support_of, shifted_of, level_of = planes.support_at, context._shifted, LevelCod
 wave_of, escape_of = LevelCoder._wave, planes._Decoder._escape
 position_of, samples_of = pyramid._position, PyramidTexture._samples
 unpack_of, premultiplied_of = pyramid.unpack, compose.premultiplied
-apart_of = Cuts.apart
+moved_of = Occlusion.moved
 
 _FAULTS: dict[str, list[Patch]] = {
     "causal-off-by-one": [(context, "CAUSAL", (*registered_model.CAUSAL[:-1], (-1, 3)))],
@@ -185,15 +185,15 @@ _FAULTS: dict[str, list[Patch]] = {
     "ignores-alpha-planes": [(pyramid, "unpack", _opaque)],
     "ignores-mask": [(PyramidTexture, "shown", None)],
     "fills-black": [(pyramid, "diffused", _black)],
-    "ignores-cuts": [(Cuts, "of", lambda *a: None)],
-    "cuts-mixed-samples": [(Cuts, "shown", property(_unmixed))],
-    "trusts-mixed-samples": [(Cuts, "trusted", property(lambda self: self.shown))],
-    "keeps-rims": [(Cuts, "apart", lambda *a: NOTHING)],
-    "keeps-rims-of-its-own": [(Cuts, "apart", lambda *a: apart_of(*a)._replace(behind=()))],
+    "ignores-cuts": [(Occlusion, "of", lambda *a: None)],
+    "cuts-mixed-samples": [(Occlusion, "shown", property(_unmixed))],
+    "trusts-mixed-samples": [(Occlusion, "trusted", property(lambda self: self.shown))],
+    "keeps-rims": [(Occlusion, "moved", lambda *a: ALL_IN_PLACE)],
+    "keeps-rims-of-its-own": [(Occlusion, "moved", lambda *a: moved_of(*a)._replace(behind=()))],
     "keeps-rims-of-what-is-not-drawn": [(Pose, "still", _only_where)],
-    "loses-rims-everywhere": [(Cuts, "apart", _all_bare)],
-    "loses-rims-of-what-moves-together": [(Cuts, "apart", _back_bares)],
-    "trusts-samples-near": [(cuts, "REACH", 1)],
+    "loses-rims-everywhere": [(Occlusion, "moved", _all_bare)],
+    "loses-rims-of-what-moves-together": [(Occlusion, "moved", _back_bares)],
+    "trusts-samples-near": [(occlusion, "REACH", 1)],
 }  # fmt: skip
 
 # The compiled kernel would not have the faults.

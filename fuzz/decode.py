@@ -17,8 +17,8 @@ from fuzz import run
 
 with run.imports(__name__):
     from proxyimg_codec import from_bytes
+    from proxyimg_codec.api import Image
     from proxyimg_codec.errors import FormatError, LimitError, PxiError, UnsupportedError
-    from proxyimg_codec.image import Image
     from proxyimg_codec.limits import Limits
     from proxyimg_codec.validation import validate
     from proxyimg_codec.validation.warnings import ERROR

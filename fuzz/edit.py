@@ -16,10 +16,9 @@ from fuzz import run
 
 with run.imports(__name__):
     from proxyimg_codec import from_bytes
+    from proxyimg_codec.api import Image
     from proxyimg_codec.edit.operations import KINDS, OPERATIONS
-    from proxyimg_codec.edit.script import apply
     from proxyimg_codec.errors import PxiError
-    from proxyimg_codec.image import Image
 
 PICTURES = (
     "layers", "bent-turned", "posed", "alpha", "pyramid-cuts", "pyramid-cuts-several", "tree",
@@ -122,7 +121,7 @@ def one_input(data: bytes) -> None:
     done = 0
     while source and done < STEPS:
         with contextlib.suppress(PxiError):
-            image = apply(image, [operation(source, image)])
+            image = image.edited(operation(source, image))
             done += 1
     try:
         saved = image.to_bytes()

@@ -11,6 +11,7 @@ from pathlib import Path
 import msgpack
 import numpy as np
 
+from proxyimg_codec.api import Image, from_bytes
 from proxyimg_codec.container import chunks
 from proxyimg_codec.container.fields import unpack
 from proxyimg_codec.container.file import fields_of
@@ -20,7 +21,6 @@ from proxyimg_codec.geometry.boundary import Boundary
 from proxyimg_codec.geometry.mesh import Refined
 from proxyimg_codec.geometry.pose import Pose
 from proxyimg_codec.geometry.track import Track
-from proxyimg_codec.image import Image, from_bytes
 from proxyimg_codec.io.files import read_bytes
 from proxyimg_codec.texture.diffusion import fill
 from proxyimg_codec.texture.planes import Planes

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from proxyimg_codec.api import from_bytes
 from proxyimg_codec.container import (
     head,
     layr,
@@ -32,7 +33,6 @@ from proxyimg_codec.container.file import parse
 from proxyimg_codec.entropy import arrays
 from proxyimg_codec.geometry import boundary, deltas
 from proxyimg_codec.geometry import mesh as meshes
-from proxyimg_codec.image import from_bytes
 
 from . import pyramid, registry
 from .dump import dump, values

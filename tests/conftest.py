@@ -62,7 +62,7 @@ def small_masks() -> dict[str, np.ndarray]:
 def small_pxi(tmp_path_factory, small_masks) -> Path:
     """A file of 64x48 pixels with the layers back, bar and disc."""
     pytest.importorskip("cv2")
-    from proxyimg_codec.encoder.encode import encode
+    from proxyimg_codec import encode
     from proxyimg_codec.encoder.shapes.masks import Region
 
     picture = smooth(64, 48)

@@ -4,9 +4,10 @@ from dataclasses import replace
 
 from conformance.builders import Numbers
 from conformance.moving import moving, track
-from proxyimg_codec.edit.transforms import meshed
+from proxyimg_codec.api import Image
+from proxyimg_codec.geometry.mesher import derived
 from proxyimg_codec.geometry.track import Timeline
-from proxyimg_codec.image import Image, Layers
+from proxyimg_codec.model import Layers
 from tests import pyramids
 
 LOOP = Timeline(1500, 8, True, 5, 2, '{"version": 1, "preset": "sway"}\n')
@@ -21,12 +22,15 @@ def picture(names=("bar", "disc"), line: Timeline = LOOP, reach: int = 12) -> Im
         line: The timeline.
         reach: Largest displacement of a shape in units of the timeline; there are two.
     """
-    image = pyramids.implicit()
-    layers = [meshed(v, 0.2) if v.name in names else v for v in image.layers]
+    picture = pyramids.implicit().picture
+    layers = [
+        replace(v, mesh=derived(v.boundary, picture.size, 0.2)) if v.name in names else v
+        for v in picture.layers
+    ]
     n = Numbers("moving")
     tracks = {
         v.name: replace(track(n, v.mesh, line, 2, reach), body=k)
         for k, v in enumerate(layers)
         if v.name in names and v.mesh
     }
-    return moving(replace(image, layers=Layers(layers)), line, tracks)
+    return Image(moving(replace(picture, layers=Layers(layers)), line, tracks))

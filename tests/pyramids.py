@@ -1,17 +1,18 @@
 """Made-up pyramid textures: their samples come from a name, not from coded planes."""
 
 import zlib
-from dataclasses import replace
 
 import numpy as np
 
 from conformance.builders import Numbers, ellipse, network, polygon, texture
 from proxyimg_codec.container import plan
 from proxyimg_codec.geometry.boundary import Boundary
-from proxyimg_codec.image import Image, Layer, Layers
+from proxyimg_codec.model import Layer, Layers
 from proxyimg_codec.texture.occlusion import Occlusion
 from proxyimg_codec.texture.planes import Planes
 from proxyimg_codec.texture.pyramid import PyramidTexture
+from tests.support.images import changed
+from tests.support.images import image as image_of
 
 SIZE = 64, 48
 DEFAULTS = {"int": lambda f: f.low, "ints": lambda f: [f.low] * f.items, "bin": lambda f: b""}
@@ -73,7 +74,7 @@ def picture(source=None, alpha=None):
     channels = 3 if alpha is None else 4
     info = {"encoder": "", "settings": "", "areas": [2000, 448, 615]}
     stack = Layers(layers(source, alpha))
-    return Image(*SIZE, channels, alpha is None, 8, stack, (), info=info)
+    return image_of(*SIZE, channels, alpha is None, 8, stack, (), info=info)
 
 
 def cut_picture(source=None, alpha=None):
@@ -91,11 +92,11 @@ def cut_picture(source=None, alpha=None):
         cuts = Occlusion.of(numbers, k, boundaries, box)
         stack.append(Layer(name, box, boundaries[k], view(source, alpha, box, cuts=cuts)))
     info = {"encoder": "", "settings": "", "areas": [1900, 700, 615]}
-    return Image(*SIZE, channels, alpha is None, 8, Layers(stack), (), info=info)
+    return image_of(*SIZE, channels, alpha is None, 8, Layers(stack), (), info=info)
 
 
 def implicit():
     """A picture of the same size with the same layers, of implicit textures and one network."""
     n = Numbers("implicit")
-    stack = [replace(v, texture=texture(n, grid=(9, 8))) for v in layers(planes("none"))]
-    return Image(*SIZE, 3, True, 8, Layers(stack), (network(n),))
+    stack = [changed(v, texture=texture(n, grid=(9, 8))) for v in layers(planes("none"))]
+    return image_of(*SIZE, 3, True, 8, Layers(stack), (network(n),))

@@ -16,10 +16,11 @@ from proxyimg_codec.container.undo import Step
 from proxyimg_codec.errors import FormatError, LimitError
 from proxyimg_codec.geometry.coverage import coverage
 from proxyimg_codec.geometry.warp import barycentric
-from proxyimg_codec.image import Layers
 from proxyimg_codec.limits import DEFAULT_LIMITS, SMALL_FILE, Limits
+from proxyimg_codec.model import Layers
 from proxyimg_codec.validation.validate import validate
 from tests import moving
+from tests.support.images import changed
 
 ROOT = Path(__file__).parents[1]
 
@@ -35,14 +36,14 @@ def first_that_works(name, work):
     while low < high:
         middle = (low + high) // 2
         try:
-            work(replace(DEFAULT_LIMITS, **{name: middle}))
+            work(changed(DEFAULT_LIMITS, **{name: middle}))
         except LimitError:
             low = middle + 1
         else:
             high = middle
     if low:
         with pytest.raises(LimitError, match=f"--limit {name}="):
-            work(replace(DEFAULT_LIMITS, **{name: low - 1}))
+            work(changed(DEFAULT_LIMITS, **{name: low - 1}))
     return low
 
 
@@ -128,7 +129,7 @@ def test_a_history_makes_room_for_metadata(picture, monkeypatch):
 def test_what_is_written_has_no_more_metadata_than_readers_accept(picture):
     block = bytes((1 << 25) + 1)
     with pytest.raises(LimitError, match="metadata"):
-        replace(picture, blocks={"icc": block, "xmp": block}).to_bytes()
+        changed(picture, blocks={"icc": block, "xmp": block}).to_bytes()
 
 
 def test_faces_of_all_meshes_count_together(picture):
@@ -136,10 +137,10 @@ def test_faces_of_all_meshes_count_together(picture):
         if layer.mesh is None:
             return layer
         flags = [np.ones(len(layer.mesh.base.triangles), bool)]
-        return replace(layer, mesh=layer.mesh.split(flags), track=None)
+        return changed(layer, mesh=layer.mesh.split(flags), track=None)
 
     layers = Layers(map(split, picture.layers))
-    data = replace(picture, layers=layers, timeline=None).to_bytes()
+    data = changed(picture, layers=layers, timeline=None).to_bytes()
 
     def opened(limits):
         for layer in from_bytes(data, limits).layers:

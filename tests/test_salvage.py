@@ -1,7 +1,6 @@
 """Files that are cut off or damaged, with `tolerant`: what arrived is shown, and never silently."""
 
 import logging
-from dataclasses import replace
 
 import msgpack
 import numpy as np
@@ -16,6 +15,7 @@ from proxyimg_codec.container.chunks import MAPS_UNTIL, Chunk, read, write
 from proxyimg_codec.container.fields import unpack
 from proxyimg_codec.errors import FormatError, UnsupportedError
 from proxyimg_codec.texture import planes
+from tests.support.images import changed
 
 LEVELS = 3
 
@@ -205,7 +205,7 @@ def bent(data, kind):
 
 
 def test_what_can_be_done_without(layered, caplog):
-    image = replace(pxi.from_bytes(layered), blocks={"exif": b"MM"}, info=None)
+    image = changed(pxi.from_bytes(layered), blocks={"exif": b"MM"}, info=None)
     edited = image.layers["disc"].moved(1, 1)
     for kind in ("eXIf", "uNDO"):
         data = bent(edited.to_bytes(), kind)

@@ -14,18 +14,20 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from conformance import pixels
 from conformance.cases import load
+from proxyimg_codec.api import from_bytes
 from proxyimg_codec.container import chunks, file
 from proxyimg_codec.entropy import arrays, laplace, rans
 from proxyimg_codec.errors import FormatError
 from proxyimg_codec.geometry import boundary, coverage, deltas, mesh, pose, warp
 from proxyimg_codec.geometry.mesh import Base, Mesh
 from proxyimg_codec.geometry.pose import REST, Pose
-from proxyimg_codec.image import Image, Layer, Layers, from_bytes
 from proxyimg_codec.limits import Limits
+from proxyimg_codec.model import Layer, Layers
 from proxyimg_codec.texture import context, diffusion, planes, pyramid, registered_model
 from proxyimg_codec.texture.implicit import ImplicitTexture
 from proxyimg_codec.texture.network import NetShape, Network
 from tests.geometry.test_mesh import lattice
+from tests.support.images import image as image_of
 
 ROOT = Path(__file__).parents[1]
 SPEC = ROOT / "spec"
@@ -392,7 +394,7 @@ def random_image(seed):
     layers.append(Layer("copy", (3, 2, 9, 8), shape_of, texture, made, sampling, posed))
     hidden = Pose(hidden=True)
     layers.append(Layer("hidden", (0, 0, 16, 12), None, layers[0].texture, None, 0, hidden))
-    return Image(16, 12, channels, channels == 3, 8, Layers(layers), tuple(nets))
+    return image_of(16, 12, channels, channels == 3, 8, Layers(layers), tuple(nets))
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -13,10 +13,11 @@ from proxyimg_codec.container.chunks import Chunk, read, write
 from proxyimg_codec.container.undo import Step
 from proxyimg_codec.errors import FormatError, LimitError, PxiError, UnsupportedError
 from proxyimg_codec.geometry import deltas
-from proxyimg_codec.image import Layers
 from proxyimg_codec.limits import Limits
+from proxyimg_codec.model import Layers
 from proxyimg_codec.validation import validate, warnings
 from tests import moving, pyramids
+from tests.support.images import changed
 
 ROOT = Path(__file__).parents[1]
 CASES = load()
@@ -43,7 +44,7 @@ def first_of(chunks, type_):
     return next(k for k, c in enumerate(chunks) if c.type == type_)
 
 
-def changed(data, type_, declared, **new):
+def rewritten(data, type_, declared, **new):
     """A file with other values in its first chunk of a type."""
     chunks = read(data)
     k = first_of(chunks, type_)
@@ -132,7 +133,7 @@ def test_independent_errors_are_all_reported(still):
 
 
 def test_streams_are_decoded_on_after_an_error(still):
-    data = changed(still.to_bytes(), "LAYR", layr.FIELDS, unit=1)
+    data = rewritten(still.to_bytes(), "LAYR", layr.FIELDS, unit=1)
     chunks = read(data)
     k = first_of(chunks, "TEXR")
     values = fields.unpack(texr.FIELDS, chunks[k].payload, "")
@@ -143,18 +144,18 @@ def test_streams_are_decoded_on_after_an_error(still):
 
 
 def test_a_mesh_that_nothing_needs_is_checked(still):
-    plain = replace(still, layers=Layers([replace(v, mesh=None) for v in still.layers]))
+    plain = changed(still, layers=Layers([changed(v, mesh=None) for v in still.layers]))
     whole = moving.picture()
     bar = next(v for v in whole.layers if v.name == "bar")
-    image = replace(
+    image = changed(
         plain,
         layers=Layers(
-            replace(v, mesh=bar.mesh) if v.name == "bar" else v for v in plain.layers
+            changed(v, mesh=bar.mesh) if v.name == "bar" else v for v in plain.layers
         ),
     )  # fmt: skip
     data = image.to_bytes()
     assert errors(data) == []
-    (issue,) = errors(changed(data, "MESH", mesh.FIELDS, far=[0]))
+    (issue,) = errors(rewritten(data, "MESH", mesh.FIELDS, far=[0]))
     assert (issue.code, issue.chunk) == ("MSH-9", "MESH 0")
 
 
@@ -204,7 +205,7 @@ def with_chunk(image, chunk):
 
 def test_a_bad_block_leaves_the_rest_to_be_checked(still):
     block = fields.pack(meta.FIELDS, {"size": 6, "zstd": meta.compressed(b"II*\0abc")})
-    data = changed(with_chunk(still, Chunk("eXIf", block)), "LAYR", layr.FIELDS, unit=1)
+    data = rewritten(with_chunk(still, Chunk("eXIf", block)), "LAYR", layr.FIELDS, unit=1)
     assert [(v.code, v.chunk) for v in check(data)] == [("CHK-8", "LAYR 0"), ("CHK-16", "eXIf")]
 
 
@@ -268,10 +269,10 @@ def test_long_histories_are_not_checked_as_a_whole(still, edited, monkeypatch, b
 
 
 def posed(image, name, **new):
-    return replace(
+    return changed(
         image,
         layers=Layers(
-            replace(v, pose=replace(v.pose, **new)) if v.name == name else v for v in image.layers
+            changed(v, pose=changed(v.pose, **new)) if v.name == name else v for v in image.layers
         ),
     )
 
@@ -310,14 +311,14 @@ def icc(size=128, space=b"RGB ", mark=b"acsp"):
     ],
 )
 def test_metadata(still, name, block, codes):
-    assert odd(replace(still, blocks={name: block})) == codes
+    assert odd(changed(still, blocks={name: block})) == codes
 
 
 @pytest.mark.parametrize(("text", "codes"), [('{"a": 1}', []), ("[]", ["VAL-6"]), ("{", ["VAL-6"])])
 def test_settings(still, text, codes):
-    assert odd(replace(still, info={"encoder": "x", "settings": text, "areas": []})) == codes
+    assert odd(changed(still, info={"encoder": "x", "settings": text, "areas": []})) == codes
     whole = moving.picture()
-    assert odd(replace(whole, timeline=replace(whole.timeline, script=text))) == codes
+    assert odd(changed(whole, timeline=replace(whole.timeline, script=text))) == codes
 
 
 def test_layers_that_do_not_show(still):
@@ -335,9 +336,9 @@ def test_folded_meshes():
     flipped = -2 * (nodes - nodes.mean(0).astype(int))[:, 0] >> 6
     swapped = zero.nodes if zero.nodes is not None else 0 * nodes
     swapped[:, 0] = flipped
-    layers = [replace(v, pose=replace(zero, nodes=swapped if v is disc else None, sway=None))
+    layers = [changed(v, pose=replace(zero, nodes=swapped if v is disc else None, sway=None))
               for v in image.layers]  # fmt: skip
-    folded = replace(image, layers=Layers(layers))
+    folded = changed(image, layers=Layers(layers))
     assert odd(folded) == ["VAL-9"]
     mirrored = posed(folded, "disc", matrix=(-1 << 24, 0, 0, 1 << 24), shift=(64 << 10, 0))
     assert odd(mirrored) == ["VAL-9"]
@@ -349,12 +350,12 @@ def test_motion_without_displacement():
     whole = moving.picture()
     assert odd(whole) == []
     layers = [
-        replace(v, track=v.track and replace(v.track, shapes=0 * v.track.shapes))
+        changed(v, track=v.track and replace(v.track, shapes=0 * v.track.shapes))
         if v.name == "bar"
         else v
         for v in whole.layers
     ]
-    (issue,) = check(replace(whole, layers=Layers(layers)).to_bytes())
+    (issue,) = check(changed(whole, layers=Layers(layers)).to_bytes())
     assert (issue.code, issue.chunk) == ("VAL-10", "mOTN")
     assert "'bar'" in issue.message
 

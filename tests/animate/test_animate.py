@@ -13,8 +13,9 @@ from proxyimg_codec import from_bytes
 from proxyimg_codec.animate.animate import amplitude, boxes, preset
 from proxyimg_codec.animate.motion import PRESETS, Handle, Key, LayerMotion, Motion
 from proxyimg_codec.errors import LimitError, UsageError
-from proxyimg_codec.image import Layers
+from proxyimg_codec.model import Layers
 from tests import pyramids
+from tests.support.images import changed
 
 SHORT = {"duration": 0.5, "fps": 12}
 
@@ -144,7 +145,7 @@ def test_what_cannot_move_is_told(still):
     ):
         with pytest.raises(UsageError, match=said):
             boxes(picture, names)
-    alone = replace(still, layers=Layers([still.layers["back"]]))
+    alone = changed(still, layers=Layers([still.layers["back"]]))
     with pytest.raises(UsageError, match="no layer that can move"):
         boxes(alone)
     with pytest.raises(UsageError, match="no layer that can move"):

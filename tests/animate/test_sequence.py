@@ -10,13 +10,15 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from proxyimg_codec.animate.sequence import frames, times
+from proxyimg_codec.api import Image
 from proxyimg_codec.errors import PxiError, UsageError
 from proxyimg_codec.geometry import coverage as cover
 from proxyimg_codec.geometry.track import Track
-from proxyimg_codec.image import Image, Layers
+from proxyimg_codec.model import Layers
 from proxyimg_codec.render.compose import outline
 from proxyimg_codec.render.view import make_view
 from tests import moving
+from tests.support.images import changed
 
 TIMES = [0.0, 0.2, 0.4, 0.9, 1.3]
 
@@ -49,11 +51,11 @@ def test_a_moment_is_the_still_in_that_pose(image):
         if track is not None:
             ones = np.full((2, line.coefficients), 256)
             track = Track(ones, track.shapes, track.body)
-        layers.append(replace(layer, track=track))
+        layers.append(changed(layer, track=track))
         nodes = None if track is None else 4 * track.shapes.sum(0)
-        posed.append(replace(layer, track=None, pose=replace(layer.pose, nodes=nodes)))
-    moves = replace(image, layers=Layers(layers))
-    still = replace(image, layers=Layers(posed), timeline=None)
+        posed.append(changed(layer, track=None, pose=replace(layer.pose, nodes=nodes)))
+    moves = changed(image, layers=Layers(layers))
+    still = changed(image, layers=Layers(posed), timeline=None)
     for t in (0, 0.7, -3):
         np.testing.assert_array_equal(moves.render(t=t), still.render())
     assert moves.at(0.7).to_bytes() == still.to_bytes()
@@ -73,8 +75,8 @@ def test_a_time_is_the_picture_at_that_moment(image, options):
 
 
 def test_without_a_time_the_still_is_drawn(image):
-    layers = Layers(replace(v, track=None) for v in image.layers)
-    still = replace(image, layers=layers, timeline=None)
+    layers = Layers(changed(v, track=None) for v in image.layers)
+    still = changed(image, layers=layers, timeline=None)
     np.testing.assert_array_equal(image.render(), still.render())
     for wrong in (still.at, lambda t: still.render(t=t)):
         with pytest.raises(UsageError, match="does not move"):

@@ -22,6 +22,7 @@ from proxyimg_codec.animate.simulate import Body, simulate
 from proxyimg_codec.animate.system import System
 from proxyimg_codec.errors import UsageError
 from tests.animate.shapes import areas, box, sheet
+from tests.support.images import changed
 
 CANVAS = (200, 160)
 JELLY = MATERIALS["jelly"]
@@ -256,7 +257,7 @@ def test_layers_stay_on_the_canvas_and_on_their_floor():
     assert x.min() >= 0
     assert (x.max((0, 1)) <= CANVAS).all()
     assert x.max((0, 1)) == pytest.approx(CANVAS)
-    floored = moved([body], replace(motion, layers={"sheet": replace(layer, floor=True)}))["sheet"]
+    floored = moved([body], changed(motion, layers={"sheet": replace(layer, floor=True)}))["sheet"]
     y = (body.nodes + floored)[..., 1]
     assert y.max() <= body.nodes[:, 1].max()
     assert y[8:].max() == pytest.approx(body.nodes[:, 1].max())

@@ -11,6 +11,7 @@ from proxyimg_codec.animate.coupling import touching
 from proxyimg_codec.geometry.pose import REST
 from proxyimg_codec.geometry.warp import barycentric
 from tests.pyramids import cut_picture
+from tests.support.images import changed
 
 
 @pytest.fixture
@@ -26,7 +27,7 @@ def shifted(layer, by):
     """The layer with its boundary moved across by pixels."""
     shape = layer.boundary
     paths = tuple(p + np.array([by << shape.unit, 0]) for p in shape.paths)
-    return replace(layer, boundary=replace(shape, paths=paths))
+    return changed(layer, boundary=replace(shape, paths=paths))
 
 
 def test_what_touches_is_found(picture):

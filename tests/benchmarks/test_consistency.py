@@ -8,12 +8,13 @@ import pytest
 from proxyimg_codec.edit.transforms import meshed
 from proxyimg_codec.geometry.mesh import FRACTION_BITS
 from proxyimg_codec.geometry.track import Timeline, Track
-from proxyimg_codec.image import Layers
+from proxyimg_codec.model import Layers
 from proxyimg_codec.render.view import make_view
 
 pytest.importorskip("cv2")
 
 from benchmarks import consistency as c
+from tests.support.images import changed
 
 
 @pytest.fixture
@@ -23,10 +24,10 @@ def moved(pyramid):
     shape = np.zeros((1, len(disc.mesh.refined.nodes), 2), np.int64)
     shape[..., 0] = 16
     curve = np.array([[0, 0, 0, 256, 256, 0, 0]], np.int64)
-    disc = replace(disc, track=Track(curve, shape))
+    disc = changed(disc, track=Track(curve, shape))
     timeline = Timeline(1000, 24, False, 4, 2)
     layers = [disc if v.name == "disc" else v for v in pyramid.layers]
-    return replace(pyramid, layers=Layers(layers), timeline=timeline)
+    return changed(pyramid, layers=Layers(layers), timeline=timeline)
 
 
 def shift(image, t):
@@ -63,8 +64,8 @@ def test_texture_that_swims_is_told(moved):
     texture = moved.layers["disc"].texture
     left, top, columns, rows = texture.part
     texture = replace(texture, part=(left + 1, top, columns - 1, rows), cuts=None, mask=None)
-    layers = [replace(v, texture=texture) if v.name == "disc" else v for v in after.layers]
-    good, bad = c.pair(before, after), c.pair(before, replace(after, layers=Layers(layers)))
+    layers = [changed(v, texture=texture) if v.name == "disc" else v for v in after.layers]
+    good, bad = c.pair(before, after), c.pair(before, changed(after, layers=Layers(layers)))
     assert bad[1] / bad[0] > 10 * good[1] / good[0]
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import proxyimg_codec as pxi
-from proxyimg_codec.encoder.encode import encode
+from proxyimg_codec import encode
 from proxyimg_codec.io.raster import read
 from proxyimg_codec.render import engines
 

@@ -5,12 +5,12 @@ import os
 import subprocess
 import sys
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import proxyimg_codec as pxi
+from tests.support.images import changed
 
 ROOT = Path(__file__).parents[2]
 HEAVY = {"torch", "cv2", "onnx", "onnxruntime", "OpenImageIO", "tqdm"}
@@ -49,8 +49,8 @@ def test_hostile_texts_cannot_write_to_the_terminal(tool, small_pxi, tmp_path):
     image = pxi.open(small_pxi)
     path = tmp_path / "a.pxi"
     info = {**image.info, "encoder": "\x1b[2Jme", "settings": "[" * 60000}
-    layers = [replace(v, name=f"{v.name}\x1b[2J\n") for v in image.layers]
-    replace(image, info=info, layers=type(image.layers)(layers)).save(path)
+    layers = [changed(v, name=f"{v.name}\x1b[2J\n") for v in image.layers]
+    changed(image, info=info, layers=type(image.layers)(layers)).save(path)
     out = tool("info", path).out
     assert b"\x1b" not in out
     assert b"me" in out
@@ -62,8 +62,8 @@ def test_hostile_texts_cannot_write_to_the_terminal(tool, small_pxi, tmp_path):
 @pytest.mark.parametrize("flags", [(), ("--json",)])
 def test_names_that_the_terminal_cannot_show(launch, small_pxi, tmp_path, flags):
     image = pxi.open(small_pxi)
-    layers = [replace(v, name=f"{v.name} \u732b") for v in image.layers]
-    replace(image, layers=type(image.layers)(layers)).save(tmp_path / "a.pxi")
+    layers = [changed(v, name=f"{v.name} \u732b") for v in image.layers]
+    changed(image, layers=type(image.layers)(layers)).save(tmp_path / "a.pxi")
     environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
     out = launch("info", tmp_path / "a.pxi", *flags, env=environment).out
     assert b"\\u732b" in out

@@ -11,6 +11,7 @@ from proxyimg_codec.cli.validate import RESULTS
 from proxyimg_codec.container.chunks import Chunk, read, write
 from proxyimg_codec.validation.warnings import CODES
 from tests import pyramids
+from tests.support.images import changed
 
 ROOT = Path(__file__).parents[2]
 CASES = ROOT / "conformance" / "cases"
@@ -112,11 +113,11 @@ def test_json_is_stable(tool, doubtful):
 def test_names_cannot_write_to_the_terminal(tool, launch, tmp_path):
     image = pyramids.implicit()
     layers = [
-        replace(v, name=f"{v.name}\x1b[2J\n\u732b", pose=replace(v.pose, hidden=v.name == "bar"))
+        changed(v, name=f"{v.name}\x1b[2J\n\u732b", pose=replace(v.pose, hidden=v.name == "bar"))
         for v in image.layers
     ]
     path = tmp_path / "a\x1b[2J.pxi"
-    replace(image, layers=type(image.layers)(layers)).save(path)
+    changed(image, layers=type(image.layers)(layers)).save(path)
     out = tool("validate", path).out
     assert b"\x1b" not in out
     assert len(out.splitlines()) == 2

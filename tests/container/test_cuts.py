@@ -7,10 +7,11 @@ import pytest
 import proxyimg_codec as pxi
 from proxyimg_codec.container.file import parse, serialize
 from proxyimg_codec.errors import LimitError
-from proxyimg_codec.image import Layers
 from proxyimg_codec.limits import Limits
+from proxyimg_codec.model import Layers
 from tests.container.test_pyramid_file import refused
 from tests.pyramids import cut_picture
+from tests.support.images import changed
 
 CUTS = [
     (1, {"cuts": [0, 2]}, "TEXR: cuts do not ascend, lie behind, or do not exist"),
@@ -33,7 +34,7 @@ def test_cuts_are_those_of_the_layer_that_has_the_texture(made_up_planes):
     """A layer that shares a view may lie elsewhere, and have no boundary."""
     image = cut_picture()
     disc = image.layers["disc"]
-    image = replace(image, info=None, layers=Layers([*image.layers, replace(disc, name="twin")]))
+    image = changed(image, info=None, layers=Layers([*image.layers, changed(disc, name="twin")]))
     c = parse(image.to_bytes())
     other = {**c.layers[3], "box": [0, 0, 9, 9], "unit": 0, "segments": [], "classes": b"",
              "deltas": b""}  # fmt: skip

@@ -13,13 +13,15 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import proxyimg_codec as pxi
 from conformance.invalid_motion import CASES, LINE, MOTION, Moving
+from proxyimg_codec.api import from_bytes
 from proxyimg_codec.container.chunks import read
 from proxyimg_codec.container.file import parse, serialize
 from proxyimg_codec.errors import FormatError, LimitError
 from proxyimg_codec.geometry.track import Track
-from proxyimg_codec.image import Layers, from_bytes
 from proxyimg_codec.limits import Limits
+from proxyimg_codec.model import Layers
 from tests import moving
+from tests.support.images import changed
 
 BASE = Moving()
 
@@ -114,8 +116,8 @@ def test_files_come_back_byte_for_byte(tmp_path, line):
 
 def test_the_still_is_what_it_was():
     image = moving.picture()
-    still = replace(
-        image, timeline=None, layers=Layers(replace(v, track=None) for v in image.layers)
+    still = changed(
+        image, timeline=None, layers=Layers(changed(v, track=None) for v in image.layers)
     )
     np.testing.assert_array_equal(from_bytes(image.to_bytes()).render(), still.render())
     with_motion, without = image.chunks, still.chunks
@@ -197,10 +199,10 @@ def test_a_writer_keeps_within_the_limits():
     disc = image.layers["disc"]
     line = replace(image.timeline, intervals=65530)
     shapes = np.repeat(disc.track.shapes, 32, 0)
-    long = replace(disc, track=Track(np.ones((64, 65530), np.int64), shapes))
+    long = changed(disc, track=Track(np.ones((64, 65530), np.int64), shapes))
     layers = Layers([*image.layers[:2], long])
     with pytest.raises(LimitError, match=r"motion: .* exceeds"):
-        replace(image, layers=layers, timeline=replace(line, loop=True)).to_bytes()
+        changed(image, layers=layers, timeline=replace(line, loop=True)).to_bytes()
 
 
 def test_the_chunk_stands_with_the_metadata():

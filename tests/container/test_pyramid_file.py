@@ -11,10 +11,11 @@ from proxyimg_codec.container.fields import pack
 from proxyimg_codec.container.file import parse, serialize
 from proxyimg_codec.container.texr import PYRAMID_FIELDS
 from proxyimg_codec.errors import FormatError, LimitError
-from proxyimg_codec.image import Layers
 from proxyimg_codec.limits import Limits
+from proxyimg_codec.model import Layers
 from tests import pyramids
 from tests.pyramids import implicit, layers, picture, planes, view
+from tests.support.images import changed
 
 
 @pytest.fixture
@@ -28,8 +29,8 @@ def several(made_up_planes):
     """A picture whose layers have planes of their own; the bar shows those of the disc."""
     one, two = planes("one"), planes("two")
     back, bar, disc = layers(one)
-    bar, disc = (replace(v, texture=replace(v.texture, planes=two)) for v in (bar, disc))
-    return replace(picture(), layers=Layers([back, bar, disc]))
+    bar, disc = (changed(v, texture=replace(v.texture, planes=two)) for v in (bar, disc))
+    return changed(picture(), layers=Layers([back, bar, disc]))
 
 
 def test_files_come_back_to_the_byte(pyramid, soft, several):
@@ -60,7 +61,7 @@ def test_planes_are_numbered_by_first_use(soft, several):
     assert numbers(soft) == (["colour", "soft"], [(0, 2)] * 3)
     assert numbers(several) == (["one", "two"], [(0, 0), (1, 0), (1, 0)])
     back, bar, disc = several.layers
-    other = replace(several, opaque=False, layers=Layers([bar, back, disc]))
+    other = changed(several, opaque=False, layers=Layers([bar, back, disc]))
     assert numbers(other) == (["two", "one"], [(0, 0), (1, 0), (0, 0)])
 
 
@@ -69,8 +70,8 @@ def test_equal_views_are_stored_once(pyramid):
     disc = pyramid.layers["disc"]
     equal = replace(disc.texture)
     assert equal is not disc.texture
-    more = [replace(disc, name="a"), replace(disc, name="b", texture=equal)]
-    image = replace(pyramid, info=None, layers=Layers([*pyramid.layers, *more]))
+    more = [changed(disc, name="a"), changed(disc, name="b", texture=equal)]
+    image = changed(pyramid, info=None, layers=Layers([*pyramid.layers, *more]))
     c = parse(image.to_bytes())
     assert [t.get("texture") for t in c.textures] == [None, None, None, 2, 2]
     again = pxi.from_bytes(image.to_bytes())
@@ -250,8 +251,8 @@ def test_views_of_other_parts(made_up_planes):
     """A part need not lie where the box is, nor be as large."""
     source = planes("colour")
     image = picture(source)
-    back = replace(image.layers[0], texture=view(source, part=(5, 6, 7, 8)))
-    image = replace(image, layers=Layers([back, *image.layers[1:]]))
+    back = changed(image.layers[0], texture=view(source, part=(5, 6, 7, 8)))
+    image = changed(image, layers=Layers([back, *image.layers[1:]]))
     again = pxi.from_bytes(image.to_bytes())
     assert again.layers[0].texture.part == (5, 6, 7, 8)
     assert again.to_bytes() == image.to_bytes()

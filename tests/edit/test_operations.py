@@ -1,7 +1,6 @@
 """Every operation, on a small picture with the layers back, bar and disc."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +13,7 @@ from proxyimg_codec.geometry import coverage as cover
 from proxyimg_codec.io import raster
 from proxyimg_codec.render.compose import outline
 from proxyimg_codec.render.view import make_view
+from tests.support.images import changed
 
 
 @pytest.fixture(scope="module")
@@ -266,7 +266,7 @@ def test_children_of_what_is_removed_move_up(image):
 
 
 def test_a_mesh_is_derived_where_the_file_has_none(image):
-    bare = replace(image, layers=type(image.layers)(replace(v, mesh=None) for v in image.layers))
+    bare = changed(image, layers=type(image.layers)(changed(v, mesh=None) for v in image.layers))
     moved = bare.layers["disc"].moved(3, 3)
     assert moved.layers["disc"].mesh is None  # not needed
     bent = bare.layers["disc"].dragged({(32, 14): (6, -2), (32, 34): (0, 0)})
@@ -278,7 +278,7 @@ def test_a_mesh_is_derived_where_the_file_has_none(image):
 
 def test_unknown_chunks_go_unless_they_are_safe_to_copy(image):
     extra = (Chunk("abCd", b"1"), Chunk("abCD", b"2"))
-    edited = replace(image, extra=extra).layers["disc"].moved(1, 1)
+    edited = changed(image, extra=extra).layers["disc"].moved(1, 1)
     assert [c.type for c in edited.extra] == ["abCd"]
     assert [c.type for c in edited.undone().extra] == ["abCd", "abCD"]
 

@@ -2,7 +2,6 @@
 
 import re
 import sys
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,12 +10,13 @@ import proxyimg_codec as pxi
 from proxyimg_codec.export import svg
 from proxyimg_codec.geometry.boundary import COORDINATE_MAX, Boundary
 from proxyimg_codec.geometry.coverage import FULL, coverage
-from proxyimg_codec.image import Layers
 from proxyimg_codec.limits import Limits
+from proxyimg_codec.model import Layers
 
 pytest.importorskip("svgelements")
 
 from proxyimg_codec.edit.outlines import load
+from tests.support.images import changed
 
 SVG = 'xmlns="http://www.w3.org/2000/svg"'
 INK = 'xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape"'
@@ -63,9 +63,9 @@ def test_every_unit_and_the_whole_range_come_back(image, unit):
     rng = np.random.default_rng(unit)
     top = COORDINATE_MAX - 1
     paths = tuple(rng.integers(-top, top, (3 * m, 2), endpoint=True) for m in (1, 4))
-    changed = replace(image.layers["disc"], boundary=Boundary(unit, paths))
-    other = replace(image, layers=Layers([*image.layers[:2], changed]))
-    assert same(load(other, svg.build(other))["disc"], changed.boundary)
+    drawn = changed(image.layers["disc"], boundary=Boundary(unit, paths))
+    other = changed(image, layers=Layers([*image.layers[:2], drawn]))
+    assert same(load(other, svg.build(other))["disc"], drawn.boundary)
 
 
 def test_the_unchanged_outline_of_a_moved_layer_is_passed_over(image):
@@ -168,8 +168,8 @@ def test_labels_go_before_ids(image, names):
 
 
 def test_titles_and_ids_of_odd_names(image):
-    named = [replace(v, name=n) for v, n in zip(image.layers, ("a", "1 <b>", "c d"), strict=True)]
-    other = replace(image, layers=Layers(named))
+    named = [changed(v, name=n) for v, n in zip(image.layers, ("a", "1 <b>", "c d"), strict=True)]
+    other = changed(image, layers=Layers(named))
     titled = '<path id="p"><title>c d</title></path>'.replace("<path", '<path d="M8 8H16V16z"')
     assert list(load(other, one(titled))) == ["c d"]
     unlabelled = re.sub(rb' inkscape:label="[^"]*"', b"", svg.build(other))
@@ -281,7 +281,7 @@ def test_limits(image):
 
 
 def test_a_layer_that_covers_a_picture_with_alpha_may_get_an_outline(image):
-    clear = replace(image, opaque=False)
+    clear = changed(image, opaque=False)
     data = one('<rect id="back" width="60" height="48"/>')
     assert (
         load(clear, data)["back"].paths[0][::3]

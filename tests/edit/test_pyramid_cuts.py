@@ -13,14 +13,14 @@ from proxyimg_codec.container.file import parse
 from proxyimg_codec.export import openraster
 from proxyimg_codec.geometry import coverage as cover
 from proxyimg_codec.geometry.boundary import Boundary
-from proxyimg_codec.image import Layers
 from proxyimg_codec.io import raster
+from proxyimg_codec.model import Layers
 from proxyimg_codec.render.compose import outline
 from proxyimg_codec.render.view import make_view
-from proxyimg_codec.texture.occlusion import ALL_REMOVED, ALL_IN_PLACE, Moved, Occlusion
+from proxyimg_codec.texture.occlusion import ALL_IN_PLACE, ALL_REMOVED, Moved, Occlusion
 from tests.edit.test_operations import EDITS, covered, grown
 from tests.pyramids import SIZE, cut_picture, implicit, planes, view
-from tests.texture.test_cuts import near
+from tests.texture.test_occlusion import near
 
 
 @pytest.fixture
@@ -30,7 +30,7 @@ def cut(made_up_planes):
 
 
 def kinds(image):
-    """Occlusion of each layer's TEXR, ``mask`` or the number of the layer whose texture it shares."""
+    """Cuts of each layer's TEXR, ``mask`` or the number of the layer whose texture it shares."""
     return [
         t["texture"] if t["coder"] == 0 else "mask" if t.get("mask") else t.get("cuts")
         for t in parse(image.to_bytes()).textures

@@ -8,10 +8,11 @@ import pytest
 
 import proxyimg_codec as pxi
 from proxyimg_codec.errors import UsageError
-from proxyimg_codec.image import Layers
+from proxyimg_codec.model import Layers
 from proxyimg_codec.texture.pyramid import PyramidTexture
 from tests.edit.test_operations import EDITS, covered, grown
 from tests.pyramids import implicit, picture, planes, view
+from tests.support.images import changed
 
 
 def saved(image, path):
@@ -86,8 +87,8 @@ def test_removal_shows_the_smooth_back(pyramid):
 
 def test_planes_that_nothing_shows_leave_the_file(made_up_planes):
     image = picture()
-    other = replace(image.layers["disc"], texture=view(planes("other")))
-    image = replace(image, layers=Layers([*image.layers[:2], other]))
+    other = changed(image.layers["disc"], texture=view(planes("other")))
+    image = changed(image, layers=Layers([*image.layers[:2], other]))
     gone = image.layers["disc"].removed()
     names = [{c.payload[-5:] for c in v.chunks if c.type == "PLAN"} for v in (image, gone)]
     assert len(names[0]) == 2
@@ -98,9 +99,9 @@ def test_planes_that_nothing_shows_leave_the_file(made_up_planes):
 def test_order_numbers_planes_anew(made_up_planes):
     image = picture()
     bar, disc = (
-        replace(v, texture=replace(v.texture, planes=planes(v.name))) for v in image.layers[1:]
+        changed(v, texture=replace(v.texture, planes=planes(v.name))) for v in image.layers[1:]
     )
-    image = replace(image, layers=Layers([image.layers[0], bar, disc]))
+    image = changed(image, layers=Layers([image.layers[0], bar, disc]))
     for edited in (
         image.layers["bar"].reordered("front"), image.layers["disc"].reordered(0),
         image.layers["back"].removed(), image.layers["disc"].duplicated(),
@@ -160,8 +161,8 @@ def test_textures_from_an_implicit_file(pyramid, tmp_path, fit):
     assert (covered(again, "disc") == (shown[..., 3] > 0)).all()
     if fit == "box":
         bar = implicit().layers["bar"]
-        stretched = replace(again.layers["disc"], texture=bar.texture)
-        expected = replace(implicit(), layers=Layers([stretched]), info=None, opaque=False)
+        stretched = changed(again.layers["disc"], texture=bar.texture)
+        expected = changed(implicit(), layers=Layers([stretched]), info=None, opaque=False)
         np.testing.assert_array_equal(shown, expected.render(engine="numpy"))
     # Without that layer the network goes too.
     assert again.layers["disc"].removed().networks == ()

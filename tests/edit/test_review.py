@@ -12,6 +12,7 @@ from proxyimg_codec.cli.edit import listing
 from proxyimg_codec.container.undo import Step
 from proxyimg_codec.edit.operations import HANDLES_MAX
 from proxyimg_codec.errors import InputError, UsageError
+from tests.support.images import changed
 
 
 @pytest.fixture(scope="module")
@@ -127,8 +128,8 @@ def test_a_texture_is_what_its_source_shows(image, fit):
 
 def test_textures_at_nodes_fit_no_other_outline(image):
     node = image.layers["bar"]
-    layers = [replace(v, sampling=3) if v is node else v for v in image.layers]
-    sampled = replace(image, layers=type(image.layers)(layers))
+    layers = [changed(v, sampling=3) if v is node else v for v in image.layers]
+    sampled = changed(image, layers=type(image.layers)(layers))
     assert sampled.layers["disc"].textured("bar").layers["disc"].sampling == 3
     with pytest.raises(UsageError, match="box to box"):
         sampled.layers["disc"].textured("bar", fit="shape")
@@ -138,7 +139,7 @@ def test_a_network_is_brought_along_once(image, tmp_path):
     path = str(tmp_path / "other.pxi")
     network = image.networks[0]
     other = replace(network, weights=tuple(w[::-1].copy() for w in network.weights))
-    replace(image, networks=(other,)).save(path)
+    changed(image, networks=(other,)).save(path)
     first = image.layers["disc"].textured(path, "bar")
     assert len(first.networks) == 2
     second = first.layers["bar"].textured(path, "bar")
@@ -175,7 +176,7 @@ def test_histories_of_other_programs_are_listed_and_control_no_terminal(
 ):
     moved = image.layers["disc"].moved(1, 1)
     path = tmp_path / "odd.pxi"
-    replace(moved, history=(Step(operation, moved.history[0].chunks),)).save(path)
+    changed(moved, history=(Step(operation, moved.history[0].chunks),)).save(path)
     for ran in (tool("edit", path, "--list"), tool("info", path)):
         line = next(v for v in ran.out.decode().split("\n") if v.startswith("edit 1: "))
         assert line.isprintable()

@@ -13,9 +13,9 @@ from proxyimg_codec.export import openraster as export
 from proxyimg_codec.export.common import at_full_opacity
 from proxyimg_codec.io import xml
 from proxyimg_codec.io.psnr import psnr_8bit
-from proxyimg_codec.render.quality import psnr
 from proxyimg_codec.io.raster import encode_png
 from proxyimg_codec.limits import Limits
+from proxyimg_codec.render.quality import psnr
 from tests.conftest import smooth
 from tests.test_pictures import icc
 

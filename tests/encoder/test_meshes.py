@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 
-from proxyimg_codec.io.samples import to_float
 from proxyimg_codec.encoder.settings import Settings
 from proxyimg_codec.encoder.shapes.layers import plan_layers
 from proxyimg_codec.encoder.shapes.masks import Region
@@ -10,6 +9,7 @@ from proxyimg_codec.errors import UsageError
 from proxyimg_codec.geometry import coverage as cover
 from proxyimg_codec.geometry.mesh import Base, Mesh
 from proxyimg_codec.geometry.raster import rasterize
+from proxyimg_codec.io.samples import to_float
 from proxyimg_codec.render.compose import outline
 from proxyimg_codec.render.view import make_view
 from tests.conftest import disc, smooth

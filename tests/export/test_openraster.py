@@ -2,7 +2,6 @@
 
 import io
 import zipfile
-from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -11,9 +10,10 @@ import pytest
 import proxyimg_codec as pxi
 from proxyimg_codec.export import openraster
 from proxyimg_codec.geometry.boundary import Boundary
-from proxyimg_codec.image import Layers
 from proxyimg_codec.io.raster import parse
+from proxyimg_codec.model import Layers
 from tests.conftest import smooth
+from tests.support.images import changed
 
 pytest.importorskip("OpenImageIO")
 
@@ -114,9 +114,9 @@ def test_source_over_gives_a_picture_with_soft_alpha():
 
 def shown(image: pxi.Image, **poses) -> pxi.Image:
     layers = [
-        replace(v, pose=replace(v.pose, **poses.get(v.name, {})), name=v.name) for v in image.layers
+        changed(v, pose=changed(v.pose, **poses.get(v.name, {})), name=v.name) for v in image.layers
     ]
-    return replace(image, layers=Layers(layers))
+    return changed(image, layers=Layers(layers))
 
 
 def test_opacity_and_visibility_are_attributes(image):
@@ -140,8 +140,8 @@ def test_nothing_visible_is_an_empty_picture(image):
 def test_layers_that_leave_the_canvas_are_clipped(image, shift, size):
     bar = image.layers["bar"]
     paths = tuple(p + np.array([shift << bar.boundary.unit, 0]) for p in bar.boundary.paths)
-    moved = replace(bar, boundary=Boundary(bar.boundary.unit, paths))
-    away = replace(image, layers=Layers([image.layers["back"], moved]))
+    moved = changed(bar, boundary=Boundary(bar.boundary.unit, paths))
+    away = changed(image, layers=Layers([image.layers["back"], moved]))
     data = openraster.build(away)
     attributes, pixels = layers_of(data)[0]
     assert 0 <= int(attributes["x"]) < 64
@@ -165,8 +165,8 @@ def test_some_layers_only(image):
 
 
 def test_names_are_safe_in_xml(image):
-    layers = [replace(v, name=n) for v, n in zip(image.layers, NAMES, strict=True)]
-    data = openraster.build(replace(image, layers=Layers(layers)))
+    layers = [changed(v, name=n) for v, n in zip(image.layers, NAMES, strict=True)]
+    data = openraster.build(changed(image, layers=Layers(layers)))
     got = [a["name"] for a, _ in layers_of(data)][::-1]
     assert got == ['<a href="x">&amp;', "Bär\n猫", "\ufffd bell"]
 
@@ -176,7 +176,7 @@ NAMES = ('<a href="x">&amp;', "Bär\n猫", "\x07 bell")
 
 def test_colour_profiles_go_with_every_picture(image):
     profile = bytes(range(256)) * 2
-    parts = unzip(openraster.build(replace(image, blocks={"icc": profile, "xmp": b"<x/>"})))
+    parts = unzip(openraster.build(changed(image, blocks={"icc": profile, "xmp": b"<x/>"})))
     assert all(b"iCCP" in v for k, v in parts.items() if k.endswith(".png"))
     assert not any(b"<x/>" in v for v in parts.values())
 

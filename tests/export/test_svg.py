@@ -1,7 +1,6 @@
 """Outlines as SVG: exact coordinates, order, names, colours."""
 
 import re
-from dataclasses import replace
 from fractions import Fraction
 from xml.etree import ElementTree
 
@@ -11,7 +10,8 @@ import pytest
 import proxyimg_codec as pxi
 from proxyimg_codec.export import svg
 from proxyimg_codec.geometry.boundary import COORDINATE_MAX, Boundary
-from proxyimg_codec.image import Layers
+from proxyimg_codec.model import Layers
+from tests.support.images import changed
 
 LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
 
@@ -88,9 +88,9 @@ def test_fill_is_the_mean_colour(image):
 
 def test_opacity_and_visibility(image):
     poses = {"bar": {"opacity": 32768}, "disc": {"hidden": True}}
-    layers = [replace(v, pose=replace(v.pose, **poses.get(v.name, {}))) for v in image.layers]
+    layers = [changed(v, pose=changed(v.pose, **poses.get(v.name, {}))) for v in image.layers]
     before = elements(svg.build(image))
-    back, bar, disc = elements(svg.build(replace(image, layers=Layers(layers))))
+    back, bar, disc = elements(svg.build(changed(image, layers=Layers(layers))))
     assert (back.get("opacity"), back.get("display")) == (None, None)
     assert float(bar.get("opacity")) == pytest.approx(0.5, abs=1e-4)
     assert disc.get("display") == "none"
@@ -109,8 +109,8 @@ def test_a_layer_off_the_canvas_is_black(image):
 
 def test_names_are_escaped_and_ids_unique(image):
     names = ['1 "<&>"', "Bär猫", "B_r_"]
-    layers = [replace(v, name=n) for v, n in zip(image.layers, names, strict=True)]
-    got = elements(svg.build(replace(image, layers=Layers(layers))))
+    layers = [changed(v, name=n) for v, n in zip(image.layers, names, strict=True)]
+    got = elements(svg.build(changed(image, layers=Layers(layers))))
     assert [e.get(LABEL) for e in got] == names
     assert [e.get("id") for e in got] == ["_1______", "B_r_", "B_r__2"]
 

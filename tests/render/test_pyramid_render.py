@@ -5,12 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from proxyimg_codec.api import Image
 from proxyimg_codec.errors import FormatError
-from proxyimg_codec.image import Layers
+from proxyimg_codec.model import Layers
 from proxyimg_codec.render import compose
 from proxyimg_codec.texture.planes import Planes
 from tests.pyramids import SIZE, picture, planes, view
 from tests.render.test_render import ENGINES
+from tests.support.images import changed
 
 
 def test_at_rest_the_picture_is_the_raster(pyramid):
@@ -43,8 +45,8 @@ def test_engines_agree(engine, pyramid):
 
 
 def test_enlarging_interpolates_and_reducing_averages(pyramid):
-    back = replace(pyramid.layers["back"], texture=view(planes("colour")))
-    flat = replace(pyramid, layers=Layers([back]), info=None)
+    back = changed(pyramid.layers["back"], texture=view(planes("colour")))
+    flat = changed(pyramid, layers=Layers([back]), info=None)
     expected = planes("colour").raster
     small = flat.render(scale=0.5, dtype=np.float32)
     np.testing.assert_allclose(small, expected.reshape(24, 2, 32, 2, 3).mean((1, 3)), atol=1e-6)
@@ -73,8 +75,8 @@ def test_alpha_is_straight_in_the_planes(made_up_planes):
     source, soft = planes("colour"), planes("soft", components=1)
     soft.__dict__["raster"] = np.maximum(soft.raster, np.float32(0.1))
     image = picture(source, soft)
-    back = replace(image.layers[0], texture=view(source, soft))
-    out = replace(image, layers=Layers([back]), info=None).render(dtype=np.float32)
+    back = changed(image.layers[0], texture=view(source, soft))
+    out = changed(image, layers=Layers([back]), info=None).render(dtype=np.float32)
     np.testing.assert_allclose(out[..., :3], source.raster, atol=1e-5)
     np.testing.assert_allclose(out[..., 3:], soft.raster, atol=1e-6)
     over = image.render(layers=["back", "disc"], dtype=np.float32)[24, 40]
@@ -89,8 +91,8 @@ def test_overshoot_of_the_kernel_is_clamped(pyramid):
     source = planes("colour")
     source.__dict__["raster"] = np.zeros((48, 64, 3), np.float32)
     source.raster[:, 32:] = 1
-    back = replace(pyramid.layers["back"], texture=view(source))
-    image = replace(pyramid, layers=Layers([back]), info=None)
+    back = changed(pyramid.layers["back"], texture=view(source))
+    image = changed(pyramid, layers=Layers([back]), info=None)
     plain = back.texture.sample(np.array([31.25, 32.75]), np.array([9.5, 9.5]), back.box)
     assert plain[0, 0] < -0.05
     assert plain[1, 0] > 1.05
@@ -108,11 +110,11 @@ def test_other_textures_in_the_same_place_are_not_mixed_up(pyramid):
         replace(disc.texture, planes=other), replace(disc.texture, part=(0, 0, 31, 30)),
         replace(disc.texture, mask=None),
     ):  # fmt: skip
-        layers = [*pyramid.layers[:2], replace(disc, texture=texture)]
-        changed = replace(pyramid, layers=Layers(layers))
-        assert changed.cache is pyramid.cache
-        fresh = replace(changed, cache=type(changed.cache)())
-        np.testing.assert_array_equal(changed.render(scale=2), fresh.render(scale=2))
+        layers = [*pyramid.layers[:2], changed(disc, texture=texture)]
+        other = changed(pyramid, layers=Layers(layers))
+        assert other.cache is pyramid.cache
+        fresh = Image(other)
+        np.testing.assert_array_equal(other.render(scale=2), fresh.render(scale=2))
 
 
 def test_corrupt_planes_are_found_when_they_are_drawn(pyramid, monkeypatch):
@@ -128,8 +130,8 @@ def test_the_size_of_the_raster_is_free(made_up_planes):
     """Half as many samples as pixels: those in the middle of four pixels mix their neighbours."""
     source = planes("half", (32, 24))
     image = picture(planes("colour"))
-    back = replace(image.layers[0], texture=view(source))
-    out = replace(image, layers=Layers([back]), info=None).render(dtype=np.float32)
+    back = changed(image.layers[0], texture=view(source))
+    out = changed(image, layers=Layers([back]), info=None).render(dtype=np.float32)
     means = out.reshape(24, 2, 32, 2, 3).mean((1, 3))
     assert np.abs(means - source.raster).mean() < 0.03
     assert out.shape == (SIZE[1], SIZE[0], 3)

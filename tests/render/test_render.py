@@ -4,11 +4,12 @@ import pytest
 import proxyimg_codec as pxi
 from proxyimg_codec.errors import LimitError, UnsupportedError, UsageError
 from proxyimg_codec.geometry.boundary import Boundary
-from proxyimg_codec.image import Image, Layer, Layers
+from proxyimg_codec.model import Layer, Layers
 from proxyimg_codec.native import kernel
 from proxyimg_codec.render import compose
 from proxyimg_codec.texture.implicit import ImplicitTexture
 from proxyimg_codec.texture.network import NetShape, Network
+from tests.support.images import image as image_of
 from tests.texture.test_network import random_network
 
 ENGINES = [
@@ -49,7 +50,7 @@ def stack(*layers, size=(20, 12), opaque=None):
     ]
     if opaque is None:
         opaque = channels == 3 and layers[0][1] is None
-    return Image(*size, channels, opaque, 8, Layers(items), networks)
+    return image_of(*size, channels, opaque, 8, Layers(items), networks)
 
 
 RED, GREEN, BLUE = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
@@ -70,7 +71,7 @@ def test_partial_coverage_mixes():
     image = stack((RED, None), (GREEN, [square(0, 0, 10, 12)]))
     moved = Boundary(6, (image.layers[1].boundary.paths[0] + np.array([16, 0]),))
     layer = Layer("edge", (0, 0, 20, 12), moved, plane(1))
-    image = Image(20, 12, 3, True, 8, Layers([image.layers[0], layer]), image.networks)
+    image = image_of(20, 12, 3, True, 8, Layers([image.layers[0], layer]), image.networks)
     assert image.render()[5, 10].tolist() == [191, 64, 0]
     assert image.render()[5, 0].tolist() == [64, 191, 0]
 
@@ -129,7 +130,7 @@ def test_engines_agree_on_any_network(engine):
     network = random_network(NetShape(5, 6, 13, 3, 4), 8)
     codes = rng.integers(-8, 8, (5, 7, 9)).astype(np.int8)
     texture = ImplicitTexture(0, 4, np.full(5, 0.1, np.float16), codes, rng.random((7, 9)) < 0.7)
-    image = Image(
+    image = image_of(
         33, 21, 4, False, 8, Layers([Layer("a", (0, 0, 33, 21), None, texture)]), (network,)
     )
     reference = image.render(engine="numpy", dtype=np.float32)

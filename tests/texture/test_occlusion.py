@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from conformance.builders import ellipse, polygon
 from proxyimg_codec.geometry.boundary import Boundary
-from proxyimg_codec.texture import cuts as module
-from proxyimg_codec.texture.occlusion import ALL_REMOVED, ALL_IN_PLACE, Moved, Occlusion
+from proxyimg_codec.texture import occlusion as module
 from proxyimg_codec.texture.diffusion import diffused
+from proxyimg_codec.texture.occlusion import ALL_IN_PLACE, ALL_REMOVED, Moved, Occlusion
 from proxyimg_codec.texture.pyramid import FILL_ONE
 from tests.pyramids import planes, view
 
@@ -108,11 +108,15 @@ def test_bands_do_not_show(monkeypatch):
 
 def test_if_none_would_show_all_do():
     everything = rectangle(-1000, -1000, 10000, 10000)
-    for cuts in (Occlusion(None, (everything,), PART), Occlusion(rectangle(0, 0, 16, 16), (), PART)):
+    for cuts in (
+        Occlusion(None, (everything,), PART),
+        Occlusion(rectangle(0, 0, 16, 16), (), PART),
+    ):
         assert cuts.shown.all()
         assert cuts.trusted.all()
     assert (
-        view(planes("a", (40, 30)), part=PART, cuts=Occlusion(None, (everything,), PART)).shown is None
+        view(planes("a", (40, 30)), part=PART, cuts=Occlusion(None, (everything,), PART)).shown
+        is None
     )
 
 
@@ -130,8 +134,8 @@ def test_if_none_can_be_trusted_all_that_show_are(across, columns):
 def cut():
     """A view from which a disc and what is beside a rectangle are cut."""
     own = rectangle(8 * 16 + 8, 5 * 16 + 3, 26 * 16, 21 * 16)
-    return view(planes("a", (40, 30)), part=PART,
-                cuts=Occlusion(own, (Boundary(UNIT, (ellipse((17, 12), (5, 4)),)),), PART))  # fmt: skip
+    disc = Boundary(UNIT, (ellipse((17, 12), (5, 4)),))
+    return view(planes("a", (40, 30)), part=PART, cuts=Occlusion(own, (disc,), PART))
 
 
 def centres(at):

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from proxyimg_codec import from_bytes
+from proxyimg_codec import encode, from_bytes
 from proxyimg_codec.container.file import parse
-from proxyimg_codec.encoder.encode import encode
 from proxyimg_codec.encoder.pyramid.picture import _view
 from proxyimg_codec.encoder.shapes.masks import Region, load_masks
 from proxyimg_codec.geometry.boundary import Boundary

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from proxyimg_codec import from_bytes
-from proxyimg_codec.encoder.encode import encode
+from proxyimg_codec import encode, from_bytes
 from proxyimg_codec.encoder.pyramid import encode as pyramid
 from proxyimg_codec.encoder.pyramid import rate, refine
 from proxyimg_codec.encoder.pyramid.encode import Effort, Raster, Window

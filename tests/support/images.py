@@ -1,0 +1,25 @@
+"""Pictures made and changed field by field, as no user can."""
+
+from dataclasses import replace
+
+from proxyimg_codec.api import Image, Layer
+from proxyimg_codec.model import Layers, Picture
+from proxyimg_codec.render.neighbours import settled
+
+
+def image(*args, **fields):
+    """An image of the fields of a `Picture`, whose layers may be handles."""
+    return Image(Picture(*args[:5], _data(args[5]), *args[6:], **fields))
+
+
+def changed(whole, **fields):
+    """An image, a layer, or any other dataclass with other fields."""
+    if isinstance(whole, Image):
+        if "layers" in fields:
+            fields["layers"] = Layers(settled(list(_data(fields["layers"]))))
+        return Image(replace(whole.picture, **fields), whole.cache)
+    return replace(whole.data if isinstance(whole, Layer) else whole, **fields)
+
+
+def _data(layers):
+    return Layers(v.data if isinstance(v, Layer) else v for v in layers)
