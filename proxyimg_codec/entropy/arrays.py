@@ -152,9 +152,12 @@ def _decode_symbols(
     """Fills `known` [H + 1, W + 2, C] where `stored`."""
     ys, xs, bounds = _wavefronts(stored)
     if kernel.available():
-        kernel.decode(
-            decoder, known, ys, xs, bounds, alphabet, (COUNT_START, COUNT_STEP, COUNT_LIMIT)
+        words, states = decoder.words.astype(np.uint16), decoder.states.astype(np.uint32)
+        adaptation = COUNT_START, COUNT_STEP, COUNT_LIMIT
+        decoder.used = kernel.decode(
+            words, states, SCALE_BITS, known, ys, xs, bounds, alphabet, adaptation
         )
+        decoder.states[:] = states
         return
     if len(stored) == 1 and known.shape[2] <= FEW and stored.all():
         known[1, 1:-1] = _decoded_row(decoder, stored.shape[1], known.shape[2], alphabet)

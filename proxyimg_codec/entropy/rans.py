@@ -135,7 +135,7 @@ class Decoder:
     def __init__(self, data: bytes) -> None:
         if not data or data[0] > MAX_LANES_LOG2:
             raise FormatError("entropy-coded stream is empty or has too many lanes", rule="ENT-4")
-        self.lanes, self.scale_bits = 1 << data[0], SCALE_BITS
+        self.lanes = 1 << data[0]
         head = 1 + 4 * self.lanes + 4
         if len(data) < head:
             raise FormatError("entropy-coded stream is truncated", rule="ENT-4")

@@ -1,6 +1,8 @@
-"""The compiled kernel (`kernel.cpp`) behind ctypes: rendering, training, entropy coding.
+"""The compiled kernel (`kernel.cpp`) behind ctypes.
 
-It is optional: `available()` is false where the package was installed without a C++ compiler.
+Functions that take a structure of one module alone are called there: `texture.context_native`,
+`texture.synthesis_native`, `encoder.implicit.fit_native`. The kernel is optional: `available()`
+is false where the package was installed without a C++ compiler.
 """
 
 from __future__ import annotations
@@ -10,15 +12,12 @@ import functools
 import importlib.machinery
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FormatError
-
-if TYPE_CHECKING:
-    from ..entropy.rans import Decoder
 
 
 class Net(ct.Structure):
@@ -31,23 +30,6 @@ class Entries(ct.Structure):
     """Bilinear taps of every entry; mirrors `struct Entries`."""
 
     _fields_ = [(n, ct.c_void_p) for n in ("base", "stride", "fx", "fy")]
-
-
-class Train(ct.Structure):
-    """A training problem; mirrors `struct Train`."""
-
-    _fields_ = [
-        ("net", Net),
-        ("entries", Entries),
-        ("n_codes", ct.c_int64),
-        *((n, ct.c_void_p) for n in ("first", "coverage", "learn", "target")),
-        *((n, ct.c_void_p) for n in ("codes", "codes_m", "codes_v")),
-        *((n, ct.c_void_p) for n in ("weights", "weights_m", "weights_v")),
-        *((n, ct.c_void_p) for n in ("prior_row", "prior_next", "prior_weight")),
-        ("n_prior", ct.c_int64),
-        *((n, ct.c_void_p) for n in ("plane", "code_steps", "row_steps")),
-        *((n, ct.c_int32) for n in ("code_max", "weight_max", "threads")),
-    ]
 
 
 class Coded(ct.Structure):
@@ -80,6 +62,24 @@ class Cover(ct.Structure):
     ]
 
 
+_ADDRESS, _INT, _LONG = ct.c_void_p, ct.c_int32, ct.c_int64
+
+_SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
+    "pxi_decode": (_LONG, [ct.POINTER(Coded)]),
+    "pxi_rans_encode": (_LONG, [*(_ADDRESS,) * 3, _LONG, _INT, _INT, _ADDRESS, _ADDRESS]),
+    "pxi_pyramid_level": (ct.c_int, [_ADDRESS]),
+    "pxi_pyramid_synthesis": (ct.c_int, [_ADDRESS]),
+    "pxi_forward": (
+        None, [ct.POINTER(Net), _ADDRESS, _ADDRESS, ct.POINTER(Entries), _LONG, _ADDRESS],
+    ),
+    "pxi_sample": (None, [_ADDRESS, _LONG, _INT, ct.POINTER(Points), _ADDRESS]),
+    "pxi_coverage": (ct.c_int, [ct.POINTER(Cover), _ADDRESS, _ADDRESS, _LONG]),
+    "pxi_blend": (None, [*(_ADDRESS,) * 4, _LONG]),
+    "pxi_train": (ct.c_double, [*(_ADDRESS,) * 2, *(_LONG,) * 3, *(_ADDRESS,) * 2]),
+}  # fmt: skip
+"""Result and arguments of each function; a structure of another module is an address here."""
+
+
 @functools.cache
 def library() -> ct.CDLL | None:
     """The loaded kernel, or None where it was not built or does not load on this machine.
@@ -91,41 +91,19 @@ def library() -> ct.CDLL | None:
     for suffix in importlib.machinery.EXTENSION_SUFFIXES:
         path = Path(__file__).with_name("_kernel" + suffix)
         if path.exists():
-            try:
-                lib = ct.CDLL(str(path))
-            except OSError:
-                return None
-            lib.pxi_train.restype = ct.c_double
-            lib.pxi_train.argtypes = [
-                ct.POINTER(Train), ct.c_void_p, ct.c_int64, ct.c_int64, ct.c_int64, ct.c_void_p,
-                ct.c_void_p,
-            ]  # fmt: skip
-            lib.pxi_forward.restype = None
-            lib.pxi_forward.argtypes = [
-                ct.POINTER(Net), ct.c_void_p, ct.c_void_p, ct.POINTER(Entries), ct.c_int64,
-                ct.c_void_p,
-            ]  # fmt: skip
-            lib.pxi_decode.restype = ct.c_int64
-            lib.pxi_decode.argtypes = [ct.POINTER(Coded)]
-            lib.pxi_pyramid_level.restype = ct.c_int
-            lib.pxi_pyramid_level.argtypes = [ct.c_void_p]
-            lib.pxi_pyramid_synthesis.restype = ct.c_int
-            lib.pxi_pyramid_synthesis.argtypes = [ct.c_void_p]
-            lib.pxi_coverage.restype = ct.c_int
-            lib.pxi_coverage.argtypes = [ct.POINTER(Cover), ct.c_void_p, ct.c_void_p, ct.c_int64]
-            lib.pxi_sample.restype = None
-            lib.pxi_sample.argtypes = [
-                ct.c_void_p, ct.c_int64, ct.c_int32, ct.POINTER(Points), ct.c_void_p,
-            ]  # fmt: skip
-            lib.pxi_blend.restype = None
-            lib.pxi_blend.argtypes = [*(ct.c_void_p,) * 4, ct.c_int64]
-            lib.pxi_rans_encode.restype = ct.c_int64
-            lib.pxi_rans_encode.argtypes = [
-                ct.c_void_p, ct.c_void_p, ct.c_void_p, ct.c_int64, ct.c_int32, ct.c_int32,
-                ct.c_void_p, ct.c_void_p,
-            ]  # fmt: skip
-            return lib
+            return _loaded(path)
     return None
+
+
+def _loaded(path: Path) -> ct.CDLL | None:
+    try:
+        lib = ct.CDLL(str(path))
+    except OSError:
+        return None
+    for name, (result, arguments) in _SIGNATURES.items():
+        function = getattr(lib, name)
+        function.restype, function.argtypes = result, arguments
+    return lib
 
 
 def available() -> bool:
@@ -242,18 +220,16 @@ def coverage(
 
 
 def decode(
-    decoder: Decoder,
-    known: NDArray[np.int16],
-    y: NDArray[np.int32],
-    x: NDArray[np.int32],
-    bounds: NDArray[np.int64],
-    alphabet: int,
-    adaptation: tuple[int, int, int],
-) -> None:
+    words: NDArray[np.uint16], states: NDArray[np.uint32], scale_bits: int,
+    known: NDArray[np.int16], y: NDArray[np.int32], x: NDArray[np.int32],
+    bounds: NDArray[np.int64], alphabet: int, adaptation: tuple[int, int, int],
+) -> int:  # fmt: skip
     """Decodes symbols into `known` [H + 1, W + 2, C], as `entropy.arrays` does in numpy.
 
     Args:
-        decoder: The stream.
+        words: The stream, from its first word on.
+        states: One of each lane; they move on.
+        scale_bits: Frequencies sum to 2**scale_bits.
         known: -1 everywhere.
         y: Rows of the positions, in coding order.
         x: Columns.
@@ -261,24 +237,24 @@ def decode(
         alphabet: Number of symbols.
         adaptation: Initial count, increment and limit of the counts.
 
+    Returns:
+        How many words were used.
+
     Raises:
         FormatError: The stream ends too early.
     """
     lib = library()
     assert lib is not None, "check available() first"
-    words, states = decoder.words.astype(np.uint16), decoder.states.astype(np.uint32)
-    ys, xs = y.astype(np.int32, copy=False), x.astype(np.int32, copy=False)
     task = Coded(
         pointer(words), len(words), pointer(states),
-        decoder.lanes, known.shape[2], alphabet, known.shape[1] - 2,
-        pointer(ys), pointer(xs), pointer(bounds), len(bounds) - 1,
-        decoder.scale_bits, *adaptation, pointer(known),
+        len(states), known.shape[2], alphabet, known.shape[1] - 2,
+        pointer(y), pointer(x), pointer(bounds), len(bounds) - 1,
+        scale_bits, *adaptation, pointer(known),
     )  # fmt: skip
-    used = lib.pxi_decode(ct.byref(task))
+    used: int = lib.pxi_decode(ct.byref(task))
     if used < 0:
         raise FormatError("entropy-coded stream ends too early", rule="ENT-6")
-    decoder.states[:] = states
-    decoder.used = used
+    return used
 
 
 def rans_encode(

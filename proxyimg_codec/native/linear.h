@@ -6,6 +6,8 @@
 #include <cstring>
 #include <vector>
 
+#include "vectors.h"
+
 #if defined(__SSE2__)
 #include <immintrin.h>
 #endif

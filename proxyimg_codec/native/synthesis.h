@@ -3,7 +3,7 @@
 
 #include "linear.h"
 
-struct Synthesis {  // of one level: weights [out][in].., as in texture/model.py
+struct Synthesis {  // of one level: weights [out][in].., as in texture/registered_model.py
     const float *linear, *first, *first_bias, *second, *second_bias, *third, *third_bias, *gain;
     int32_t hidden, height, width;
     const float *low;        // [height][width][3]

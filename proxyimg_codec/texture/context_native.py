@@ -1,4 +1,4 @@
-"""Levels of a pyramid in the compiled kernel (`native/pyramid.h`); `context` is its judge."""
+"""Levels of a pyramid in the compiled kernel (`native/context.h`); `context` is its judge."""
 
 from __future__ import annotations
 

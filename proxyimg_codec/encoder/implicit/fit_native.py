@@ -1,4 +1,4 @@
-"""Training with the compiled kernel."""
+"""Training with the compiled kernel (`native/train.h`)."""
 
 from __future__ import annotations
 
@@ -11,6 +11,23 @@ from ...native import kernel
 from ...texture.network import Floats
 from .fit_problem import Problem
 from .state import State
+
+
+class _Train(ct.Structure):
+    """A training problem; mirrors `struct Train`."""
+
+    _fields_ = [
+        ("net", kernel.Net),
+        ("entries", kernel.Entries),
+        ("n_codes", ct.c_int64),
+        *((n, ct.c_void_p) for n in ("first", "coverage", "learn", "target")),
+        *((n, ct.c_void_p) for n in ("codes", "codes_m", "codes_v")),
+        *((n, ct.c_void_p) for n in ("weights", "weights_m", "weights_v")),
+        *((n, ct.c_void_p) for n in ("prior_row", "prior_next", "prior_weight")),
+        ("n_prior", ct.c_int64),
+        *((n, ct.c_void_p) for n in ("plane", "code_steps", "row_steps")),
+        *((n, ct.c_int32) for n in ("code_max", "weight_max", "threads")),
+    ]
 
 
 class NativeTrainer:
@@ -37,7 +54,7 @@ class NativeTrainer:
         m = self._moments
         # Threads meet twice a step: not worth it for little work.
         threads = min(self._jobs, max(pixels.shape[1] // 1024, 1))
-        task = kernel.Train(
+        task = _Train(
             kernel.Net(s.dim, s.octaves, s.hidden, s.depth, s.channels),
             kernel.Entries(at(p.base), at(p.stride), at(p.fx), at(p.fy)),
             p.codes,

@@ -4,7 +4,7 @@
 #include "laplace.h"
 #include "linear.h"
 
-struct ContextNet {  // of one level: weights [out][in].., as in texture/model.py
+struct ContextNet {  // of one level: weights [out][in].., as in texture/registered_model.py
     const int32_t *first, *first_bias, *second, *second_bias, *causal, *mix, *mix_bias, *luma, *luma_bias,
         *from_luma, *from_luma_bias, *chroma, *chroma_bias;
     // The products of each are in units of 2**-bits of what they give.
