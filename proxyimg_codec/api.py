@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,24 +17,15 @@ from numpy.typing import NDArray
 from . import model
 from .codec import read, write
 from .container.chunks import Chunk
-from .container.undo import Step
 from .edit.methods import Editable
 from .errors import UnsupportedError
-from .geometry.boundary import Boundary
-from .geometry.mesh import Mesh
-from .geometry.pose import Pose
-from .geometry.track import Timeline, Track
+from .handles import LayerHandle, PictureHandle
 from .io.files import write_atomically
 from .limits import DEFAULT_LIMITS, Limits
 from .model import Layers, Pictured
-from .render import neighbours, pixels
+from .render import pixels
 from .render.cache import Cache
 from .render.moment import at
-from .texture.implicit import Box
-from .texture.network import Network
-from .texture.occlusion import Moved
-from .texture.planes import Planes
-from .texture.pyramid import Texture
 
 if TYPE_CHECKING:
     from .animate.motion import Motion
@@ -44,7 +34,7 @@ if TYPE_CHECKING:
     from .encoder.shapes.masks import Region
 
 
-class Image:
+class Image(PictureHandle):
     """A `.pxi` picture in memory. Equal images have equal files; they pickle as their files.
 
     Args:
@@ -57,8 +47,13 @@ class Image:
     """
 
     def __init__(self, picture: Pictured, cache: Cache | None = None) -> None:
-        self._picture = picture.picture
+        super().__init__(picture.picture)
         self._cache = cache or Cache()
+
+    @property
+    def cache(self) -> Cache:
+        """Colours that were computed, shared with the images made from this one."""
+        return self._cache
 
     def __repr__(self) -> str:
         names = ", ".join(repr(layer.name) for layer in self._picture.layers)
@@ -78,89 +73,9 @@ class Image:
         return _restored, (write.serialized(self), self.damage)
 
     @property
-    def picture(self) -> model.Picture:
-        """The picture as data."""
-        return self._picture
-
-    @property
-    def cache(self) -> Cache:
-        """Colours that were computed, shared with the images made from this one."""
-        return self._cache
-
-    @property
-    def width(self) -> int:
-        """Canvas width in pixels."""
-        return self._picture.width
-
-    @property
-    def height(self) -> int:
-        """Canvas height in pixels."""
-        return self._picture.height
-
-    @property
-    def channels(self) -> int:
-        """3, or 4 if textures also give alpha."""
-        return self._picture.channels
-
-    @property
-    def opaque(self) -> bool:
-        """Whether the back layer covers the whole canvas, so that output has no alpha."""
-        return self._picture.opaque
-
-    @property
-    def depth(self) -> int:
-        """Bits a sample of the original, 8 or 16."""
-        return self._picture.depth
-
-    @property
     def layers(self) -> Layers[Layer]:
         """Layers back to front, addressed by position or by name."""
         return Layers(Layer(self, k) for k in range(len(self._picture.layers)))
-
-    @property
-    def networks(self) -> tuple[Network, ...]:
-        """Decoder networks of the file."""
-        return self._picture.networks
-
-    @property
-    def blocks(self) -> Mapping[str, bytes]:
-        """Metadata blocks ``icc``, ``exif``, ``xmp``."""
-        return self._picture.blocks
-
-    @property
-    def info(self) -> Mapping[str, Any] | None:
-        """Encoder, settings and areas, as in the iNFO chunk, or None."""
-        return self._picture.info
-
-    @property
-    def extra(self) -> tuple[Chunk, ...]:
-        """Unknown ancillary chunks, carried along."""
-        return self._picture.extra
-
-    @property
-    def groups(self) -> Mapping[str, str | None]:
-        """Parent of each group of layers, a name or None, by the group's name."""
-        return self._picture.groups
-
-    @property
-    def timeline(self) -> Timeline | None:
-        """When layers that have a track move, or None."""
-        return self._picture.timeline
-
-    @property
-    def history(self) -> tuple[Step, ...]:
-        """The edits that led here, oldest first, each with the state before it."""
-        return self._picture.history
-
-    @property
-    def damage(self) -> tuple[str, ...]:
-        """What was wrong with the file it was read from, where that was tolerated."""
-        return self._picture.damage
-
-    @property
-    def planes(self) -> list[Planes]:
-        """The planes that textures show, in the order of their first use."""
-        return self._picture.planes
 
     @property
     def chunks(self) -> tuple[Chunk, ...]:
@@ -169,7 +84,7 @@ class Image:
 
     def _with(self, picture: model.Picture) -> Image:
         """Another picture that shares the colours that were computed."""
-        return Image(picture, self._cache)
+        return Image(picture, self.cache)
 
     def edited(self, *operations: Mapping[str, Any]) -> Image:
         """The picture after `operations`, in order; each can be undone.
@@ -271,7 +186,7 @@ class Image:
         return pixels.render(
             self._picture, t=t, width=width, height=height, scale=scale, region=region,
             layers=layers, background=background, dtype=dtype, engine=engine, limits=limits,
-            progress=progress, cache=self._cache,
+            progress=progress, cache=self.cache,
         )  # fmt: skip
 
     def to_bytes(self) -> bytes:
@@ -291,7 +206,7 @@ class Image:
         write_atomically(path, self.to_bytes())
 
 
-class Layer(Editable[Image]):
+class Layer(LayerHandle, Editable[Image]):
     """One layer of a picture. Its methods edit: each returns a new image.
 
     Attributes:
@@ -300,8 +215,13 @@ class Layer(Editable[Image]):
     """
 
     def __init__(self, image: Image, position: int) -> None:
-        self.image = image
-        self.position = position
+        super().__init__(image.picture, position)
+        self._image = image
+
+    @property
+    def image(self) -> Image:
+        """The picture it belongs to."""
+        return self._image
 
     def __repr__(self) -> str:
         return f"<Layer {self.name!r} of {self.image!r}>"
@@ -317,71 +237,6 @@ class Layer(Editable[Image]):
     def _edited(self, op: str, **values: Any) -> Image:
         given = {k: v for k, v in values.items() if v is not None}
         return self.image.edited({"op": op, "layer": self.name, **given})
-
-    @cached_property
-    def data(self) -> model.Layer:
-        """The layer as data."""
-        return self.image.picture.layers[self.position]
-
-    @property
-    def name(self) -> str:
-        """The name, unique in the picture."""
-        return self.data.name
-
-    @property
-    def box(self) -> Box:
-        """x, y, width, height of the texture's rectangle in canvas pixels."""
-        return self.data.box
-
-    @property
-    def boundary(self) -> Boundary | None:
-        """Closed paths at rest, or None for the whole canvas."""
-        return self.data.boundary
-
-    @property
-    def outline(self) -> Boundary | None:
-        """The boundary in its present place; None for the whole canvas."""
-        return neighbours.present_outline(self.image.picture, self.data)
-
-    @property
-    def texture(self) -> Texture:
-        """Codes and the index of their network, or a view of planes."""
-        return self.data.texture
-
-    @property
-    def network(self) -> Network | None:
-        """What decodes its texture; None where that is no network of the file."""
-        return self.image.picture.network_of(self.data)
-
-    @property
-    def mesh(self) -> Mesh | None:
-        """Proxy nodes, or None."""
-        return self.data.mesh
-
-    @property
-    def sampling(self) -> int:
-        """How features are found: 0 direct, 1 to 3 at the proxy nodes."""
-        return self.data.sampling
-
-    @property
-    def pose(self) -> Pose:
-        """What edits have done to it."""
-        return self.data.pose
-
-    @property
-    def parent(self) -> str | None:
-        """Name of the layer or group that it follows, or None."""
-        return self.data.parent
-
-    @property
-    def track(self) -> Track | None:
-        """How its nodes move over the timeline of the picture, or None."""
-        return self.data.track
-
-    @property
-    def moved_neighbours(self) -> Moved:
-        """What no longer lies to it as it did when the samples of its view were mixed."""
-        return neighbours.moved_neighbours(self.image.picture, self.data)
 
 
 def _restored(data: bytes, damage: tuple[str, ...]) -> Image:
