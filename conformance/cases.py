@@ -107,6 +107,12 @@ def load(
     return [case for case in cases if case.concerns(profile, level)]
 
 
+def find(name: str) -> Case:
+    """The case of this name."""
+    (case,) = load(pattern=name)
+    return case
+
+
 def _read(place: Path, folder: Path) -> Case:
     file = place / "case.json"
     values = json.loads(file.read_text(encoding="utf-8"))

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from conformance.builders import Numbers, ellipse, network, polygon, texture
+from conformance.make.builders import Numbers, ellipse, network, polygon, texture
 from proxyimg_codec.container import plan
 from proxyimg_codec.geometry.boundary import Boundary
 from proxyimg_codec.image import Image, Layer, Layers

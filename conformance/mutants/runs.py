@@ -143,7 +143,7 @@ class Decoder:
         if fault is not None:
             sys.meta_path.insert(0, _Finder(fault))
         self._main = importlib.import_module(f"{PACKAGE}.cli.decode").main
-        for lazy in ("image", "packing", "pictures", "render.engines"):
+        for lazy in ("image", "codec.pack", "io.raster", "render.engines"):
             importlib.import_module(f"{PACKAGE}.{lazy}")
         self._digest = importlib.import_module(SYMBOLS).digest
 

@@ -2,18 +2,14 @@
 
 import ast
 import json
-import sys
-from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
-
-from conformance import mutants, mutants_record
 from conformance.cases import load
-from conformance.mutants_runs import Caught, Fault, forked, run
-from conformance.mutants_source import Mutant, choose, mutated
-from conformance.mutants_source import mutants as mutants_of
+from conformance.mutants import __main__ as command
+from conformance.mutants import inputs, record, verdicts
+from conformance.mutants.runs import ROOT, Caught, Fault, forked, run
+from conformance.mutants.source import Mutant, choose, mutants, mutated
 
 FEW = (
     "layers", "bits-3", "hole", "alpha", "opacity", "region", "reduced", "diffusion", "lanes",
@@ -29,17 +25,17 @@ SEED = 4
 
 @pytest.fixture(scope="module")
 def suite():
-    return mutants.Suite([case for case in load() if case.name in FEW])
+    return verdicts.Suite([case for case in load() if case.name in FEW])
 
 
 @pytest.fixture(scope="module")
 def everything():
-    return mutants.all_mutants()
+    return verdicts.all_mutants()
 
 
 def changed(source, operator=None):
     """The bodies of all mutants of a source, as text."""
-    found = [m for m in mutants_of("a.py", source) if operator in (None, m.operator)]
+    found = [m for m in mutants("a.py", source) if operator in (None, m.operator)]
     return {ast.unparse(mutated(source, m.number)) for m in found}
 
 
@@ -106,17 +102,17 @@ def test_messages_are_left_alone_but_their_raise_is_not():
 
 def test_places_are_named():
     source = "class A:\n    def f(self):\n        if (a\n                > 1):\n            b()\n"
-    found = mutants_of("a.py", source)
+    found = mutants("a.py", source)
     assert {m.function for m in found} == {"A.f"}
     assert {m.lines for m in found} == {(3, 4), (5, 5)}
     assert found[-1].key == "a.py A.f: b() -> pass"
-    twice = mutants_of("a.py", "def f():\n    g()\n    g()\n")
+    twice = mutants("a.py", "def f():\n    g()\n    g()\n")
     assert [m.key for m in twice] == ["a.py f: g() -> pass", "a.py f: g() -> pass #2"]
 
 
 def test_long_statements_are_shortened_around_the_change():
     source = f"x = ({'first, ' * 40}a + b, {'last, ' * 40})"
-    (found,) = mutants_of("a.py", source)
+    (found,) = mutants("a.py", source)
     assert "a + b, last" in found.before
     assert "a - b, last" in found.after
     assert len(found.before) < 130
@@ -165,12 +161,12 @@ def test_mutants_of_the_decoder_are_caught(suite, everything):
     ],
 )
 def test_bad_endings_are_caught(suite, text, problem, monkeypatch):
-    source = mutants.ROOT.joinpath("container/head.py").read_text()
+    source = ROOT.joinpath("container/head.py").read_text()
     fields = source.replace("FIELDS = ", "def __getattr__(name):\n    pass\n\nFIELDS = ")
     code = compile(f"{fields}\n{text}\n", "head.py", "exec")
     if problem == "hang":
         # A limit of processor time holds while cases run, not while modules are imported.
-        rest = mutants.ROOT.joinpath("render/view.py").read_text()
+        rest = ROOT.joinpath("render/view.py").read_text()
         code = compile(f"{rest}\n\ndef make_view(*_):\n    {text}\n", "view.py", "exec")
     fault = Fault("render/view.py" if problem == "hang" else "container/head.py", code)
     caps = dict.fromkeys(FEW, 0.2)
@@ -186,7 +182,7 @@ def test_a_process_tells_how_it_ends():
 
 
 def test_what_cases_run_is_recorded(suite):
-    source = mutants.ROOT.joinpath("geometry/mesh.py").read_text().splitlines()
+    source = ROOT.joinpath("geometry/mesh.py").read_text().splitlines()
     flat = next(n for n, line in enumerate(source, 1) if "def refine(" in line)
     inside = next(n for n, line in enumerate(source, 1) if n > flat and "nodes = base" in line)
     meshed = suite.record.of("geometry/mesh.py", inside, inside)
@@ -200,7 +196,7 @@ def test_a_decoder_that_fails_cannot_be_mutated(monkeypatch):
     (layers,) = load(pattern="layers")
     wrong = [type(layers)(**{**vars(layers), "renders": (), "error": "limit"})]
     with pytest.raises(RuntimeError, match="layers: the decoder itself fails: exit: code 0"):
-        mutants_record.recorded(wrong)
+        record.recorded(wrong)
 
 
 class Catcher:
@@ -215,12 +211,12 @@ class Catcher:
 
 def test_verdicts_and_figures(tmp_path, monkeypatch, capsys):
     chosen = many(1, 4)[:4]
-    monkeypatch.setattr(mutants, "EQUIVALENT", tmp_path / "known.json")
-    mutants.EQUIVALENT.write_text(json.dumps({chosen[1].key: "the same"}))
-    found = mutants.judged(chosen, Catcher(0), lambda: Catcher(1, 2), print)
+    monkeypatch.setattr(verdicts, "EQUIVALENT", tmp_path / "known.json")
+    verdicts.EQUIVALENT.write_text(json.dumps({chosen[1].key: "the same"}))
+    found = verdicts.judged(chosen, Catcher(0), lambda: Catcher(1, 2), print)
     assert [v.kind for v in found] == ["caught", "equivalent", "changes", "unknown"]
     assert [v.why for v in found][:3] == ["case: pixels", "the same", "case: pixels"]
-    text, share = mutants.summary(found, 5, 9)
+    text, share = verdicts.summary(found, 5, 9)
     assert share == pytest.approx(1 / 3)
     assert "4 mutants: 1 caught, 1 survive though" in text
     assert "not reached: 5 of 9" in text
@@ -229,17 +225,17 @@ def test_verdicts_and_figures(tmp_path, monkeypatch, capsys):
 
 @pytest.mark.parametrize(("wanted", "code"), [(0.5, 0), (1.01, 1)])
 def test_the_command(wanted, code, suite, monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr(mutants, "Suite", lambda cases: suite)
-    monkeypatch.setattr(mutants, "WANTED", wanted)
-    monkeypatch.setattr(mutants.mutants_inputs, "cases", list)
+    monkeypatch.setattr(command, "Suite", lambda cases: suite)
+    monkeypatch.setattr(command, "WANTED", wanted)
+    monkeypatch.setattr(inputs, "cases", list)
     report = tmp_path / "report.json"
     words = ["--count", "2", "--only", "render/view.py", "--json", str(report)]
-    assert mutants.main(words) == code
+    assert command.main(words) == code
     assert "2 mutants: " in capsys.readouterr().out
     assert len(json.loads(report.read_text())["mutants"]) == 2
 
 
 def test_known_mutants_exist(everything):
-    known = json.loads(mutants.EQUIVALENT.read_text())
+    known = json.loads(verdicts.EQUIVALENT.read_text())
     assert all(known.values())
     assert known.keys() <= {m.key for m in everything}
