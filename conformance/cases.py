@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +56,7 @@ class Case:
         profile: The lowest of `PROFILES` whose decoders it is for.
         level: The lowest of `LEVELS` whose decoders must read it; None if it must be refused.
         optional: Whether a decoder need not look at what is wrong with the file.
+        kind: Name of the folder that it lies in; empty if cases lie in no such folders.
     """
 
     name: str
@@ -67,9 +69,10 @@ class Case:
     profile: str = PROFILES[0]
     level: int | None = None
     optional: bool = False
+    kind: str = ""
 
     @property
-    def kind(self) -> str:
+    def outcome(self) -> str:
         """What it is: ``valid``, a class of error, or a class that is ``optional``."""
         return f"{self.error or 'valid'}{', optional' if self.optional else ''}"
 
@@ -85,7 +88,7 @@ def load(
     profile: str = PROFILES[-1],
     level: int = LEVELS[-1],
 ) -> list[Case]:
-    """The cases under `folder`, by name.
+    """The cases under `folder`, or in folders of it, by name.
 
     Args:
         folder: Where they are.
@@ -94,20 +97,30 @@ def load(
         level: Of this decoder.
 
     Raises:
-        ValueError: A `case.json` makes no sense.
+        ValueError: A `case.json` makes no sense, or two cases have one name.
     """
-    files = sorted(folder.glob("*/case.json"))
-    cases = [_read(f) for f in files if fnmatchcase(f.parent.name, pattern)]
+    places = sorted((f.parent for f in folder.rglob("case.json")), key=lambda place: place.name)
+    for one, other in pairwise(places):
+        if one.name == other.name:
+            raise ValueError(f"{one} and {other} have the same name")
+    cases = [_read(place, folder) for place in places if fnmatchcase(place.name, pattern)]
     return [case for case in cases if case.concerns(profile, level)]
 
 
-def _read(file: Path) -> Case:
+def find(name: str) -> Case:
+    """The case of this name."""
+    (case,) = load(pattern=name)
+    return case
+
+
+def _read(place: Path, folder: Path) -> Case:
+    file = place / "case.json"
     values = json.loads(file.read_text(encoding="utf-8"))
     renders = [
         Render(
             r["args"],
             flags(r["args"]),
-            file.parent / r["expected"],
+            place / r["expected"],
             float(r["peak"]),
             float(r["rms"]),
         )
@@ -125,8 +138,9 @@ def _read(file: Path) -> Case:
     if profile not in PROFILES or level not in ((None,) if error else LEVELS):
         raise ValueError(f"{file}: profile {profile} and level {level} do not fit")
     return Case(
-        file.parent.name, values["title"], tuple(values["tests"]), file.with_name("input.pxi"),
+        place.name, values["title"], tuple(values["tests"]), place / "input.pxi",
         tuple(renders), error, values.get("latents"), profile, level, optional,
+        place.parent.name if place.parent != folder else "",
     )  # fmt: skip
 
 

@@ -52,12 +52,13 @@ def table(results: Sequence[Result]) -> str:
 
 
 def listing(cases: Sequence[Case]) -> str:
-    """One line a case: name, profile, level, what it is, title, and the ids of its statements."""
+    """One line a case: name, kind, profile, level, title, outcome, and ids of its statements."""
     width = max(len(case.name) for case in cases)
-    lines = [f"{'case':{width}} profile level  title"]
+    kinds = max(len("kind"), *(len(case.kind) for case in cases))
+    lines = [f"{'case':{width}} {'kind':{kinds}} profile level  title"]
     lines += [
-        f"{case.name:{width}} {case.profile:7} {case.level or '-':>5}  {case.title} "
-        f"({case.kind}; {', '.join(case.tests)})"
+        f"{case.name:{width}} {case.kind:{kinds}} {case.profile:7} {case.level or '-':>5}  "
+        f"{case.title} ({case.outcome}; {', '.join(case.tests)})"
         for case in cases
     ]
     return "\n".join(lines)

@@ -89,8 +89,9 @@ class Source:
 @cache
 def pictures() -> list[Image]:
     """What is edited."""
-    paths = (run.ROOT / "conformance" / "cases" / name / "input.pxi" for name in PICTURES)
-    return [from_bytes(path.read_bytes()) for path in paths if path.exists()]
+    cases = run.ROOT / "conformance" / "cases"
+    paths = (path for name in PICTURES for path in cases.glob(f"*/{name}/input.pxi"))
+    return [from_bytes(path.read_bytes()) for path in paths]
 
 
 def operation(source: Source, image: Image) -> dict[str, Any]:

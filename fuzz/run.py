@@ -28,7 +28,7 @@ def imports(name: str) -> AbstractContextManager[Any]:
 
 def seeds(largest: int = 4096) -> list[bytes]:
     """The files of the conformance suite that have at most `largest` bytes, and the example."""
-    paths = [*sorted((ROOT / "conformance" / "cases").glob("*/input.pxi"))]
+    paths = sorted((ROOT / "conformance" / "cases").rglob("input.pxi"))
     files = [path.read_bytes() for path in (*paths, ROOT / "spec" / "example.pxi")]
     return [data for data in files if len(data) <= largest]
 

@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
-from conformance.builders import Numbers
-from conformance.moving import moving, track
+from conformance.make.builders import Numbers
+from conformance.make.valid.motion import moving, track
 from proxyimg_codec.api import Image
 from proxyimg_codec.geometry.mesher import derived
 from proxyimg_codec.geometry.track import Timeline

@@ -4,7 +4,7 @@ import zlib
 
 import numpy as np
 
-from conformance.builders import Numbers, ellipse, network, polygon, texture
+from conformance.make.builders import Numbers, ellipse, network, polygon, texture
 from proxyimg_codec.container import plan
 from proxyimg_codec.geometry.boundary import Boundary
 from proxyimg_codec.model import Layer, Layers

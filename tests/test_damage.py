@@ -15,8 +15,8 @@ from proxyimg_codec.validation.validate import validate
 ROOT = Path(__file__).parents[1]
 FILES = {
     "example": ROOT / "spec" / "example.pxi",
-    "moves-posed": ROOT / "conformance" / "cases" / "moves-posed" / "input.pxi",
-    "pyramid-cells": ROOT / "conformance" / "cases" / "pyramid-cells" / "input.pxi",
+    "moves-posed": ROOT / "conformance" / "cases" / "motion" / "moves-posed" / "input.pxi",
+    "pyramid-cells": ROOT / "conformance" / "cases" / "views" / "pyramid-cells" / "input.pxi",
 }
 """Codes, boundaries and a network; a mesh, a pose and a motion; planes, with a mask."""
 

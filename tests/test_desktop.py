@@ -62,7 +62,7 @@ def description(data):
 @needs("file")
 def test_file_describes_valid_files():
     paths = sorted(ROOT.glob("tests/golden/*/*.pxi"))
-    paths += [p.parent / "input.pxi" for p in sorted(CASES.glob("*/expected-1.png"))]
+    paths += [p.parent / "input.pxi" for p in sorted(CASES.glob("*/*/expected-1.png"))]
     expected = [description(p.read_bytes()) for p in paths]
     assert sum(" layer" in text for text in expected) > 50
     assert not all(" layer" in text for text in expected)  # some versions have a map
@@ -90,7 +90,7 @@ def test_file_reads_integers_of_all_lengths(tmp_path):
 
 @needs("file")
 def test_file_says_no_more_than_it_knows(tmp_path):
-    data = (CASES / "flipped/input.pxi").read_bytes()
+    data = (CASES / "poses/flipped/input.pxi").read_bytes()
     version = re.escape(f"ProxyImg image, version {data[8]}.{data[9]}")
     for length in range(len(chunks.SIGNATURE), 40):
         (tmp_path / str(length)).write_bytes(data[:length])
@@ -145,15 +145,15 @@ def entry():
 @pytest.mark.parametrize(
     ("case", "size", "expected"),
     [
-        ("flipped", 128, (24, 18)),  # nothing is enlarged
-        ("flipped", 16, (16, 12)),
-        ("flipped", 1, (1, 1)),
-        ("column", 16, (1, 16)),
+        ("poses/flipped", 128, (24, 18)),  # nothing is enlarged
+        ("poses/flipped", 16, (16, 12)),
+        ("poses/flipped", 1, (1, 1)),
+        ("canvases/column", 16, (1, 16)),
     ],
 )
 def test_thumbnailer_writes_a_small_png(tmp_path, case, size, expected):
     source, target = tmp_path / 'it\'s "a" $picture.pxi', tmp_path / ".thumbnail.X1Y2Z3"
-    shutil.copy(CASES / case / "input.pxi", source)
+    shutil.copy(CASES / f"{case}/input.pxi", source)
     tools = tmp_path / "bin"
     tools.mkdir()
     program = entry()["TryExec"]
@@ -195,7 +195,7 @@ def test_recipe_of_the_guide(tmp_path):
     assert f":{TYPE}]\n>0=\0\x08".encode() + chunks.SIGNATURE in (
         (installed / "mime/magic").read_bytes()
     )
-    data = (CASES / "flipped/input.pxi").read_bytes()
+    data = (CASES / "poses/flipped/input.pxi").read_bytes()
     names = ["a.pxi", "B.PXI", "without", "cython.pxi"]
     for name in names:
         (tmp_path / name).write_bytes(CYTHON.encode() if name == "cython.pxi" else data)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import proxyimg_codec as pxi
-from conformance import pyramid_views, pyramids
-from conformance.builders import Numbers
+from conformance.make.builders import Numbers
+from conformance.make.valid import pyramids, views
 from proxyimg_codec.cli.decode import DAMAGED
 from proxyimg_codec.container import plan
 from proxyimg_codec.container.chunks import MAPS_UNTIL, Chunk, read, write
@@ -34,7 +34,7 @@ def flat():
 @pytest.fixture(scope="module")
 def layered():
     """A file of two layers that show parts of one raster; one was moved."""
-    return built(pyramid_views, "pyramid-cuts")
+    return built(views, "pyramid-cuts")
 
 
 def place(data, kind=plan.TYPE):

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from conformance.cases import FOLDER
 from proxyimg_codec.cli.validate import RESULTS
 from proxyimg_codec.container.chunks import Chunk, read, write
 from proxyimg_codec.validation.warnings import CODES
@@ -14,11 +15,11 @@ from tests import pyramids
 from tests.support.images import changed
 
 ROOT = Path(__file__).parents[2]
-CASES = ROOT / "conformance" / "cases"
 
 
 def case(name):
-    return CASES / name / "input.pxi"
+    """The input of a case, or a path of nothing."""
+    return next(FOLDER.glob(f"*/{name}/input.pxi"), FOLDER / name)
 
 
 @pytest.fixture

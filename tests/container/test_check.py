@@ -8,7 +8,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from conformance.invalid_posed import CASES, COPY_TEXR, DISC_TEXR, Clear, Odd, Posed
+from conformance.make.refused.poses import CASES, COPY_TEXR, DISC_TEXR, Clear, Odd, Posed
 from proxyimg_codec.container import texr
 from proxyimg_codec.container.file import parse, serialize
 from proxyimg_codec.errors import FormatError, LimitError, UnsupportedError

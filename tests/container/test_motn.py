@@ -12,7 +12,7 @@ import zstandard
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import proxyimg_codec as pxi
-from conformance.invalid_motion import CASES, LINE, MOTION, Moving
+from conformance.make.refused.motion import CASES, LINE, MOTION, Moving
 from proxyimg_codec.api import from_bytes
 from proxyimg_codec.container.chunks import read
 from proxyimg_codec.container.file import parse, serialize

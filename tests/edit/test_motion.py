@@ -10,9 +10,9 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import proxyimg_codec as pxi
-from conformance.builders import Numbers, texture
-from conformance.moving import moving as with_tracks
-from conformance.moving import track as random_track
+from conformance.make.builders import Numbers, texture
+from conformance.make.valid.motion import moving as with_tracks
+from conformance.make.valid.motion import track as random_track
 from proxyimg_codec.edit.transforms import meshed
 from proxyimg_codec.errors import UsageError
 from proxyimg_codec.model import Layers

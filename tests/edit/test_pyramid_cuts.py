@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import proxyimg_codec as pxi
-from conformance.builders import ellipse
+from conformance.make.builders import ellipse
 from proxyimg_codec.container.file import parse
 from proxyimg_codec.export import openraster
 from proxyimg_codec.geometry import coverage as cover

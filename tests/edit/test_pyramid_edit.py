@@ -215,8 +215,8 @@ def test_alpha_comes_along(pyramid, made_up_planes, tmp_path):
 
 def test_node_sampled_layers_lend_and_borrow(pyramid, tmp_path):
     """A texture at nodes brings its way of sampling; a view takes it away."""
-    from conformance.builders import Numbers
-    from conformance.nodes import CASES
+    from conformance.make.builders import Numbers
+    from conformance.make.valid.samplings import CASES
 
     nodes = saved(CASES["node"].build(Numbers("node")), tmp_path / "node.pxi")
     changed = pyramid.layers["disc"].textured(nodes, "ring")

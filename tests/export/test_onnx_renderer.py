@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import proxyimg_codec as pxi
-from conformance import builders, pixels
+from conformance import pixels
 from conformance.cases import load
 from conformance.judge import difference
+from conformance.make import builders
 from proxyimg_codec.errors import UnsupportedError, UsageError
 from proxyimg_codec.export import onnx_graph
 from proxyimg_codec.export.onnx_renderer import BLOCK, build

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from conformance.builders import ellipse, polygon
+from conformance.make.builders import ellipse, polygon
 from proxyimg_codec.geometry.boundary import Boundary
 from proxyimg_codec.texture import occlusion as module
 from proxyimg_codec.texture.diffusion import diffused

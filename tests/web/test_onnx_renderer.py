@@ -10,7 +10,7 @@ import pytest
 
 import proxyimg_codec as pxi
 from conformance import pixels
-from conformance.cases import FOLDER, load
+from conformance.cases import find
 from tests.export.test_onnx_renderer import agrees, model_of, samples, view_of
 
 HERE = Path(__file__).parent
@@ -32,7 +32,7 @@ def test_conformance(tmp_path):
     pytest.importorskip("onnx")
     jobs, wanted = [], []
     for name in CASES:
-        (case,) = load(FOLDER, name)
+        case = find(name)
         image, render = pxi.open(case.input), case.renders[-1]
         view = view_of(image, render.args)
         inputs = samples(view)

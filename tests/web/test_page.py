@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conformance.cases import FOLDER
+from conformance.cases import find
 from proxyimg_codec.cli import decode
 
 ROOT = Path(__file__).parents[2]
@@ -82,7 +82,7 @@ def expected(case: str, shown: dict[str, Any], tmp_path: Path, *flags: str) -> n
     out = tmp_path / "out.npy"
     region = ",".join(map(str, request["region"]))
     size = ["--width", str(request["width"]), "--height", str(request["height"])]
-    source = str(FOLDER / case / "input.pxi")
+    source = str(find(case).input)
     words = [source, str(out), "--quiet", "-f", "--bit-depth", "32", "--region", region]
     assert decode.main([*words, *size, *flags]) == 0
     picture = np.load(out).astype(float)
@@ -106,7 +106,7 @@ def assert_shows(shown: dict[str, Any], wanted: np.ndarray) -> None:
 @needs_browser
 def test_drop_zoom_pan_and_hide(address: str, tmp_path: Path) -> None:
     name = "layers"
-    source = str(FOLDER / name / "input.pxi")
+    source = str(find(name).input)
     twofold = -np.log(2) / 0.002
     opened, zoomed, moved, hidden = browse(
         address,
@@ -130,7 +130,7 @@ def test_drop_zoom_pan_and_hide(address: str, tmp_path: Path) -> None:
 
 @needs_browser
 def test_refused_file_then_pyramid(address: str, tmp_path: Path) -> None:
-    bad, good = (str(FOLDER / name / "input.pxi") for name in ("invalid-crc-tail", "pyramid"))
+    bad, good = (str(find(name).input) for name in ("invalid-crc-tail", "pyramid"))
     refused, shown = browse(address, ("drop", bad), ("drop", good))
     assert refused["error"].startswith("invalid: the CRC of TAIL")
     assert shown["error"] == ""
@@ -141,7 +141,7 @@ def test_refused_file_then_pyramid(address: str, tmp_path: Path) -> None:
 @needs_browser
 def test_motion(address: str, tmp_path: Path) -> None:
     name = "moves-loop"
-    source = str(FOLDER / name / "input.pxi")
+    source = str(find(name).input)
     still, later, played = browse(address, ("drop", source), ("time", 0.25), ("play", None))
     assert_shows(still, expected(name, still, tmp_path))
     assert_shows(later, expected(name, later, tmp_path, "--time", "0.25"))

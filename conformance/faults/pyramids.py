@@ -1,0 +1,201 @@
+"""What decoders can do wrong with pyramid textures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from proxyimg_codec.entropy import laplace
+from proxyimg_codec.geometry.pose import Pose
+from proxyimg_codec.native import kernel
+from proxyimg_codec.render import compose
+from proxyimg_codec.texture import context, occlusion, planes, pyramid, registered_model, synthesis
+from proxyimg_codec.texture.context import LevelCoder
+from proxyimg_codec.texture.occlusion import ALL_IN_PLACE, ALL_REMOVED, Moved, Occlusion
+from proxyimg_codec.texture.pyramid import PyramidTexture
+
+from .basics import Patch
+
+
+def _floored(total: Any, bits: int) -> Any:
+    total *= np.float32(2.0**-bits)
+    return np.floor(total, out=total)
+
+
+def _truncated(numerator: Any, unit: int) -> Any:
+    size = np.minimum(np.abs(numerator), 508 * unit)
+    return np.sign(numerator) * (128 * size // (4 * unit + size))
+
+
+def _chroma_first(self: LevelCoder, coder: Any, ahead: Any, around: Any, given: Any) -> Any:
+    if self.grey:
+        return wave_of(self, coder, ahead, around, given)
+    w = self.weights
+    z = context.scaled(around @ self._causal, -w.causal.exponent - 3)
+    z = context.activated(z + ahead, 3)
+    z = context.activated(z @ self._mix + context._floats(w.mix_bias), -w.mix.exponent)
+    out = np.zeros((len(z), 9), np.int64)
+    self._put(coder, z @ self._chroma, w.chroma, w.chroma_bias, 1, given, out[:, 3:])
+    self._put(coder, z @ self._luma, w.luma, w.luma_bias, 0, given, out[:, :3])
+    return out
+
+
+def _waves(slope: int) -> Any:
+    def waves(support: Any) -> Iterator[context.Wave]:
+        rows, columns = np.nonzero(support)
+        times = columns + slope * rows
+        for t in np.unique(times):
+            at = times == t
+            yield context.Wave(rows[at], columns[at])
+
+    return waves
+
+
+def _everywhere(*args: Any) -> Any:
+    return np.ones_like(support_of(*args))
+
+
+def _clipped(n: int, by: int, high: bool) -> Any:
+    return np.clip(np.arange(n) + by, 0, n - 1)
+
+
+def _low_everywhere(n: int, by: int, high: bool) -> Any:
+    return shifted_of(n, by, False)
+
+
+def _without_shifts(self: Any, weights: Any, step: int, grey: bool, shifts: Any) -> None:
+    level_of(self, weights, step, grey, (0, 0))
+
+
+def _all_colour(self: Any, weights: Any, step: int, grey: bool, shifts: Any) -> None:
+    level_of(self, weights, step, False, shifts)
+
+
+def _unsigned(self: Any) -> int:
+    return abs(int(escape_of(self)))
+
+
+def _linear(f: Any) -> Any:
+    return 0 * f, 1 - f, f, 0 * f
+
+
+def _sharp(f: Any) -> Any:
+    """Keys' kernel with a = -3/4."""
+    return (
+        -0.75 * f * (1 - f) ** 2,
+        (1.25 * f - 2.25) * f * f + 1,
+        ((1.5 - 1.25 * f) * f + 0.75) * f,
+        0.75 * (f - 1) * f * f,
+    )
+
+
+def _corners(points: Any, start: int, extent: int, samples: int) -> Any:
+    at = np.clip((points - start) * ((samples - 1) / extent), 0, samples - 1)
+    before = at.astype(np.intp)
+    return before, (at - before).astype(np.float32)
+
+
+def _nearest(points: Any, start: int, extent: int, samples: int) -> Any:
+    before, f = position_of(points, start, extent, samples)
+    return np.minimum(before + (f >= 0.5), samples - 1), 0 * f
+
+
+def _straight(self: PyramidTexture, *where: Any) -> Any:
+    values = samples_of(self, *where)
+    if self.alpha is not None:
+        values[:, :3] /= np.maximum(values[:, 3:], 1e-6)
+    return values
+
+
+def _premultiplied(output: Any) -> Any:
+    if output.shape[1] == 4:
+        output[:, :3] *= output[:, 3:]
+    return premultiplied_of(output)
+
+
+def _whole(*args: Any) -> PyramidTexture:
+    found = unpack_of(*args)
+    return replace(found, part=(0, 0, *found.planes.size), mask=None, cuts=None)
+
+
+def _black(value: Any, known: Any) -> Any:
+    return np.where(known, value, 0)
+
+
+def _opaque(*args: Any) -> PyramidTexture:
+    found = unpack_of(*args)
+    return found if found.alpha is None else replace(found, alpha=None)
+
+
+def _unmixed(self: Occlusion) -> Any:
+    found = self._left(self.everything)
+    return found if found.any() else ~found
+
+
+def _all_bare(*args: Any) -> Moved:
+    found = moved_of(*args)
+    return found._replace(behind=ALL_REMOVED) if found.behind else found
+
+
+def _back_bares(*args: Any) -> Moved:
+    found = moved_of(*args)
+    return found._replace(behind=tuple((b, s) for b, s in found.behind if not s))
+
+
+def _only_where(self: Pose, other: Pose) -> bool:
+    return (self.matrix, self.shift) == (other.matrix, other.shift)
+
+
+support_of, shifted_of, level_of = planes.support_at, context._shifted, LevelCoder.__init__
+wave_of, escape_of = LevelCoder._wave, planes._Decoder._escape
+position_of, samples_of = pyramid._position, PyramidTexture._samples
+unpack_of, premultiplied_of = pyramid.unpack, compose.premultiplied
+moved_of = Occlusion.moved
+
+_FAULTS: dict[str, list[Patch]] = {
+    "causal-off-by-one": [(context, "CAUSAL", (*registered_model.CAUSAL[:-1], (-1, 3)))],
+    "causal-reversed": [(context, "CAUSAL", registered_model.CAUSAL[::-1])],
+    "context-floored": [(context, "scaled", _floored)],
+    "features-truncated": [(context, "_squashed", _truncated)],
+    "chroma-first": [(LevelCoder, "_wave", _chroma_first)],
+    "waves-too-steep": [(context, "waves", _waves(4))],
+    "ignores-support": [(planes, "support_at", _everywhere)],
+    "context-not-mirrored": [(context, "_shifted", _clipped)],
+    "context-high-mirrored-as-low": [(context, "_shifted", _low_everywhere)],
+    "synthesis-not-mirrored": [(synthesis, "mirrored_indices", lambda n, high:
+        np.clip(np.arange(-2, n + 2), 0, n - 1))],
+    "ignores-shifts": [(LevelCoder, "__init__", _without_shifts)],
+    "ignores-grey-levels": [(LevelCoder, "__init__", _all_colour)],
+    "one-level-set": [(registered_model, "LEVEL_SETS", 1)],
+    "ignores-step": [(synthesis, "STEP_ORIGIN", 0)],
+    "codes-certain-latents": [(laplace, "CERTAIN", -1)],
+    "escapes-unsigned": [(planes._Decoder, "_escape", _unsigned)],
+    "accepts-left-over-escapes": [(planes._Decoder, "finish", lambda self, where: None)],
+    "accepts-large-latents": [(context, "LIMIT", 1 << 20)],
+    "nearest-sample": [(pyramid, "_position", _nearest)],
+    "linear": [(pyramid, "_weights", _linear)],
+    "cubic-sharp": [(pyramid, "_weights", _sharp)],
+    "samples-on-corners": [(pyramid, "_position", _corners)],
+    "interpolates-straight": [(PyramidTexture, "_samples", _straight),
+        (compose, "premultiplied", _premultiplied)],
+    "ignores-part": [(pyramid, "unpack", _whole)],
+    "ignores-alpha-planes": [(pyramid, "unpack", _opaque)],
+    "ignores-mask": [(PyramidTexture, "shown", None)],
+    "fills-black": [(pyramid, "diffused", _black)],
+    "ignores-cuts": [(Occlusion, "of", lambda *a: None)],
+    "cuts-mixed-samples": [(Occlusion, "shown", property(_unmixed))],
+    "trusts-mixed-samples": [(Occlusion, "trusted", property(lambda self: self.shown))],
+    "keeps-rims": [(Occlusion, "moved", lambda *a: ALL_IN_PLACE)],
+    "keeps-rims-of-its-own": [(Occlusion, "moved", lambda *a: moved_of(*a)._replace(behind=()))],
+    "keeps-rims-of-what-is-not-drawn": [(Pose, "still", _only_where)],
+    "loses-rims-everywhere": [(Occlusion, "moved", _all_bare)],
+    "loses-rims-of-what-moves-together": [(Occlusion, "moved", _back_bares)],
+    "trusts-samples-near": [(occlusion, "REACH", 1)],
+}  # fmt: skip
+
+# The compiled kernel would not have the faults.
+FAULTS = {name: [(kernel, "available", lambda: False), *own] for name, own in _FAULTS.items()}
+"""What each wrong decoder replaces."""

@@ -1,0 +1,1 @@
+"""What makes the cases: ``python -m conformance.make``."""

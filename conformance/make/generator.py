@@ -1,0 +1,211 @@
+"""What makes cases, writes them, and compares them with those on the disk.
+
+Inputs and descriptions are the same on every machine. Expected pixels come from the package's
+plain numpy decoder, whose last bits may differ from machine to machine, and are not compared.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+import numpy as np
+
+from proxyimg_codec import errors, from_bytes
+from proxyimg_codec.codec import levels
+from proxyimg_codec.codec.write import to_bytes
+from proxyimg_codec.container import chunks, layr, motn, pose
+from proxyimg_codec.io.raster import encode_png
+from proxyimg_codec.native import kernel
+
+from .. import symbols
+from ..cases import EXIT_CODES, FOLDER, PROFILES
+from .builders import Numbers, values
+from .kinds import KIND_OF, REFUSED, VALID
+from .refused.base import Refused
+from .registry import Valid
+from .topics import statements
+
+PROVENANCE = "conformance.make_cases"
+"""What descriptions call the maker. It is `conformance.make` now; descriptions do not change."""
+
+PEAK, RMS = 0.05, 0.01
+"""Errors in 8-bit levels that are allowed: ten times what float32 sums in another order cost."""
+
+Made = tuple[bytes, dict[str, Any]]
+"""Input and description of a case."""
+
+
+@functools.cache
+def build() -> dict[str, Made]:
+    """All cases by name.
+
+    Raises:
+        RuntimeError: The package itself does not do with an input what the case demands.
+    """
+    refused = {name: bad for cases in REFUSED.values() for name, bad in cases.items()}
+    bases = {bad.base: bad.base() for bad in refused.values()}
+    return {
+        **{n: _valid(n, case) for cases in VALID.values() for n, case in cases.items()},
+        **{n: _refused(n, bad, bad.build(bases[bad.base])) for n, bad in refused.items()},
+    }
+
+
+def _valid(name: str, case: Valid) -> Made:
+    numbers = Numbers(name)
+    made = case.build(numbers)
+    data = made if isinstance(made, bytes) else to_bytes(made)
+    profile, level = levels.profile_and_level(data)
+    description = _described(case, numbers.seed)
+    description |= {"profile": profile, "level": level, "renders": _renders(case.renders)}
+    latents = symbols.digest(data)
+    if latents:
+        description["latents"] = latents
+    return data, description
+
+
+def _refused(name: str, bad: Refused, data: bytes) -> Made:
+    error = name.split("-")[0]
+    raised = _refusal(name, data)
+    if raised.exit_code != EXIT_CODES[error] or not raised.rule:
+        raise RuntimeError(f"{name}: {raised} [{raised.rule or 'no rule'}]")
+    description = _described(bad, Numbers("base").seed, raised.rule)
+    description |= {"profile": _profile(data, error), "error": error}
+    description["exit_code"] = EXIT_CODES[error]
+    if bad.optional:
+        description |= {"optional": True, "renders": _renders([{}])}
+    return data, description
+
+
+def _described(case: Valid | Refused, seed: int, *rules: str) -> dict[str, Any]:
+    return {
+        "title": case.title,
+        "tests": statements([*case.tests, *rules]),
+        "provenance": {"generator": PROVENANCE, "seed": seed},
+    }
+
+
+def _renders(wanted: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    return [
+        {"args": args, "expected": f"expected-{i}.png", "peak": PEAK, "rms": RMS}
+        for i, args in enumerate(wanted, 1)
+    ]
+
+
+def _refusal(name: str, data: bytes) -> errors.PxiError:
+    """What the package says of a file that must be refused."""
+    try:
+        from_bytes(data).render()
+    except errors.PxiError as error:
+        return error
+    raise RuntimeError(f"{name}: the package accepts it")
+
+
+def _profile(data: bytes, error: str) -> str:
+    """The lowest profile whose readers find the error in a file, and not another before."""
+    if error == "unsupported":
+        return PROFILES[0]
+    found = []
+    with contextlib.suppress(errors.PxiError):
+        found = chunks.read_damaged(data)[0]
+    if any(chunk.type == motn.TYPE for chunk in found):
+        return PROFILES[2]
+    return PROFILES[any(chunk.type == pose.TYPE or _node_sampling(chunk) for chunk in found)]
+
+
+def _node_sampling(chunk: chunks.Chunk) -> bool:
+    with contextlib.suppress(errors.PxiError):
+        return chunk.type == layr.TYPE and values(chunk)["sampling"] > 0
+    return False
+
+
+def as_text(description: dict[str, Any]) -> str:
+    """The text of `case.json`."""
+    return json.dumps(description, indent=1) + "\n"
+
+
+def place(name: str) -> str:
+    """Where a case lies in the folder of all cases."""
+    return f"{KIND_OF[name]}/{name}"
+
+
+def _present(folder: Path) -> set[str]:
+    """Where there are files, within the folder of all cases."""
+    found = (f.parent for f in folder.rglob("*") if f.is_file())
+    return {parent.relative_to(folder).as_posix() for parent in found}
+
+
+def differences(folder: Path = FOLDER) -> list[str]:
+    """Places of cases whose input or description on disk is not what the generator makes."""
+    made = {place(name): case for name, case in build().items()}
+    there = _present(folder)
+    wrong = sorted(there ^ made.keys())
+    for at in sorted(there & made.keys()):
+        data, description = made[at]
+        same = (folder / at / "input.pxi").read_bytes() == data
+        text = (folder / at / "case.json").read_text(encoding="utf-8")
+        if not (same and text == as_text(description)):
+            wrong.append(at)
+    return wrong
+
+
+def write(folder: Path = FOLDER) -> None:
+    """Replaces all cases.
+
+    Raises:
+        RuntimeError: The package itself does not do with an input what the case demands.
+    """
+    with mock.patch.dict(os.environ, PROXYIMG_NO_KERNEL="1"):
+        kernel.library.cache_clear()
+        _write(folder)
+    kernel.library.cache_clear()
+
+
+def _write(folder: Path) -> None:
+    """Makes all cases, then removes others and replaces those that differ."""
+    made = build()
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=folder.parent, prefix="cases-") as temporary:
+        new = Path(temporary)
+        _make(new, made)
+        places = {place(name) for name in made}
+        for other in _present(folder) - places:
+            shutil.rmtree(folder / other, ignore_errors=True)
+        for at in sorted(places):
+            if not _alike(new / at, folder / at):
+                shutil.rmtree(folder / at, ignore_errors=True)
+                (folder / at).parent.mkdir(parents=True, exist_ok=True)
+                (new / at).rename(folder / at)
+    for kind in folder.iterdir():
+        if not any(kind.iterdir()):
+            kind.rmdir()
+
+
+def _alike(one: Path, other: Path) -> bool:
+    """Whether two folders have the same files."""
+    if not other.is_dir() or {f.name for f in one.iterdir()} != {f.name for f in other.iterdir()}:
+        return False
+    return all(f.read_bytes() == (other / f.name).read_bytes() for f in one.iterdir())
+
+
+def _make(folder: Path, made: Mapping[str, Made]) -> None:
+    for name, (data, description) in made.items():
+        target = folder / place(name)
+        target.mkdir(parents=True)
+        (target / "input.pxi").write_bytes(data)
+        (target / "case.json").write_text(as_text(description), encoding="utf-8")
+        for render in description.get("renders", []):
+            args = dict(render["args"])
+            at = args.pop("time", None)
+            # What is optional shows what the same file shows without its fault.
+            shown = REFUSED[KIND_OF[name]][name].base().data if "error" in description else data
+            pixels = from_bytes(shown).render(t=at, **args, dtype=np.uint16, engine="numpy")
+            (target / render["expected"]).write_bytes(encode_png(pixels))

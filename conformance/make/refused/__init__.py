@@ -1,0 +1,1 @@
+"""Files that must be refused; the cases of a module lie in ``cases/refused-MODULE``."""

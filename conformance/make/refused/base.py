@@ -1,0 +1,126 @@
+"""What files that must be refused are made of: a small valid file, and ways to break it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from proxyimg_codec.codec.write import to_bytes
+from proxyimg_codec.container.chunks import MAPS_UNTIL, Chunk, read, write
+from proxyimg_codec.model import Picture
+
+from ..builders import Numbers, changed, ellipse, layer, network, picture, texture, values
+
+HEAD, BACK, DISC, NETW, BACK_TEXR, DISC_TEXR, TAIL = range(7)
+"""Positions of the chunks in the base file."""
+
+GRID = (7, 5)
+NAN, INFINITY = b"\x00\x7e", b"\x00\x7c"
+
+
+class Base:
+    """A valid file: a back and a disc with a mask, 5-bit codes, one network."""
+
+    def __init__(self) -> None:
+        self.data = to_bytes(self.build(Numbers("base")))
+        self.chunks = read(self.data)
+
+    def build(self, n: Numbers) -> Picture:
+        """The picture."""
+        stored = n.integers(0, 2, GRID[::-1]) > 0
+        back = layer("back", (0, 0, 12, 10), texture(n, grid=GRID, bits=5))
+        plane = texture(n, grid=GRID, bits=5, stored=stored)
+        disc = layer("disc", (2, 2, 8, 7), plane, ellipse((6, 5.5), (4, 3.5)))
+        return picture((12, 10), [back, disc], network(n))
+
+    def fields(self, at: int) -> dict[str, Any]:
+        """The values of chunk number `at` by key."""
+        return values(self.chunks[at])
+
+    def order(self, *positions: int) -> bytes:
+        """The chunks at `positions`."""
+        return write([self.chunks[i] for i in positions])
+
+    def payload(self, at: int, payload: bytes) -> bytes:
+        """Chunk `at` with another payload and the right CRC."""
+        chunks = list(self.chunks)
+        chunks[at] = replace(chunks[at], payload=payload)
+        return write(chunks)
+
+    def set(self, at: int, **new: Any) -> bytes:
+        """Chunk `at` with other, added or (if None) removed values."""
+        return self.payload(at, changed(self.chunks[at], new).payload)
+
+    def map(self, at: int, **new: Any) -> bytes:
+        """The same with a map, in a file of a version that has maps."""
+        return self.old(at, changed(self.chunks[at], new, in_map=True).payload)
+
+    def old(self, at: int, payload: bytes) -> bytes:
+        """A file of version 0.3 with another payload of chunk `at`."""
+        return write(read(self.payload(at, payload)), MAPS_UNTIL)
+
+    def edit(self, at: int, key: str, change: Callable[[bytes], bytes]) -> bytes:
+        """Chunk `at` with the bytes of one field changed."""
+        return self.set(at, **{key: change(self.fields(at)[key])})
+
+    def insert(self, at: int, type_: str) -> bytes:
+        """An empty chunk before chunk `at`."""
+        return write([*self.chunks[:at], Chunk(type_, b""), *self.chunks[at:]])
+
+    def damage(self, at: int, byte: int, bit: int) -> bytes:
+        """A bit of chunk `at`'s payload flipped, the CRC as it was."""
+        payload = put(self.chunks[at].payload, byte, lambda v: v ^ bit)
+        return self.data.replace(self.chunks[at].payload, payload)
+
+    def end(self, at: int) -> int:
+        """Where chunk `at` ends in the file."""
+        return (self.chunks[at].offset or 0) + self.chunks[at].size
+
+
+def put(data: bytes, at: int, change: Callable[[int], int]) -> bytes:
+    """`data` with the byte at `at` changed."""
+    out = bytearray(data)
+    out[at] = change(out[at])
+    return bytes(out)
+
+
+def words(stream: bytes, change: Callable[[bytes], bytes]) -> bytes:
+    """An entropy-coded stream with its words changed, their count with them."""
+    head = 1 + 4 * (1 << stream[0])
+    end = head + 4 + 2 * int.from_bytes(stream[head : head + 4], "little")
+    new = change(stream[head + 4 : end])
+    return stream[:head] + (len(new) // 2).to_bytes(4, "little") + new + stream[end:]
+
+
+@dataclass(frozen=True)
+class Refused:
+    """A case to be refused.
+
+    Attributes:
+        title: One sentence.
+        tests: Ids of statements that it is there for, beside that of the error of the package.
+        build: Breaks a base file.
+        base: What it breaks.
+        optional: Whether a decoder need not look, as in `cases.Case`.
+    """
+
+    title: str
+    tests: tuple[str, ...]
+    build: Callable[[Any], bytes]
+    base: type[Base] = Base
+    optional: bool = False
+
+
+Row = tuple[str, str, str, Callable[[Any], bytes]]
+"""Name, title in lower case, statements, and what breaks a base file."""
+
+
+def refused(
+    rows: Iterable[Row], base: type[Base] = Base, optional: bool = False
+) -> dict[str, Refused]:
+    """Cases by name."""
+    return {
+        name: Refused(title[0].upper() + title[1:], tuple(tests.split()), build, base, optional)
+        for name, title, tests, build in rows
+    }

@@ -1,0 +1,1 @@
+"""Valid files; the cases of a module lie in ``cases/MODULE``."""

@@ -1,0 +1,41 @@
+"""Valid cases of files of earlier versions."""
+
+from __future__ import annotations
+
+from proxyimg_codec.codec.write import to_bytes
+from proxyimg_codec.container.chunks import read, write
+
+from ..builders import (
+    Numbers,
+    bend,
+    disc,
+    grid_mesh,
+    layered,
+    on_back,
+    with_maps,
+)
+from ..registry import Valids
+
+CASES = Valids()
+_case = CASES.case
+
+
+@_case("A file of version 0.1, of maps", "file: version", "fields: maps")
+def _version_0_1(n: Numbers) -> bytes:
+    return with_maps(to_bytes(layered(n)), (0, 1))
+
+
+@_case("A file of version 0.2, of maps, with a mesh and a pose", "file: version", "fields: maps")
+def _version_0_2(n: Numbers) -> bytes:
+    mesh = grid_mesh((2, 1), 5, 4)
+    return with_maps(to_bytes(on_back(n, disc(n, mesh, nodes=bend(n, mesh)))), (0, 2))
+
+
+@_case("A file of version 0.3 with maps, but arrays in the layers", "file: version", "fields: maps")
+def _version_0_3(n: Numbers) -> bytes:
+    return with_maps(to_bytes(layered(n)), (0, 3), without=["LAYR"])
+
+
+@_case("A file of version 0.2 with arrays", "file: version", "fields: maps")
+def _arrays_0_2(n: Numbers) -> bytes:
+    return write(read(to_bytes(layered(n))), (0, 2))
