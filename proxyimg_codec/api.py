@@ -297,11 +297,11 @@ def encode(
     Args:
         pixels: [H, W] or [H, W, C] with C = 1 for grey, 2 for grey and alpha, 3 for RGB, 4 for RGB
             and alpha; alpha is straight; uint8, uint16, or floating point in 0..1.
-        settings: All settings at once; instead, single fields can be given as `options`.
+        settings: Settings of the encoder; by default ``Settings()``.
         masks: Layers given by the user, back to front; by default the encoder finds layers itself.
         blocks: Metadata blocks to carry: ``icc``, ``exif``, ``xmp``.
-        progress: Called now and then with the progress of the work.
-        options: Fields of `Settings` by name, such as ``quality=70``.
+        progress: Called with the name of a stage, and its numbers of units done and in all.
+        options: Fields of `Settings` that replace those of `settings`, such as ``quality=70``.
 
     Returns:
         The picture as a reader will decode it.
@@ -310,6 +310,7 @@ def encode(
         InputError: The array cannot be a picture, or a mask does not fit it.
         UsageError: A setting is out of range.
         UnsupportedError: A package that is needed is not installed.
+        LimitError: The picture is larger than readers accept by default.
     """
     try:
         from .encoder import encode as encoder

@@ -25,7 +25,7 @@ def to_bytes(image: Pictured) -> bytes:
     """Encodes a picture as a `.pxi` file.
 
     Raises:
-        FormatError: The picture breaks a rule of the format.
+        FormatError: The picture breaks a rule between chunks.
         LimitError: The file would exceed what readers accept by default.
     """
     content, budget = pack(image.picture), Budget()
