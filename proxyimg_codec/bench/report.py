@@ -93,7 +93,7 @@ class Log:
         write_atomically(self.path, to_csv(self.rows).encode())
 
     def reuse_note(self, name: str) -> str:
-        """Text on the measurements reused from an older file, and on the machines they come from."""
+        """Text on the measurements reused from an older file, and on machines other than this."""
         reused = len(self.rows)
         text = f"{reused} measurements reused from {name}"
         if self._given > reused:
