@@ -109,6 +109,7 @@ def decode(at: Place, stream: rans.Decoder, escapes: bytes, used: int) -> tuple[
     Raises:
         FormatError: The stream or the list of escapes is too short or corrupt, or a latent is out
             of range.
+        MemoryError: The kernel cannot allocate what it needs.
     """
     words, states = stream.words.astype(np.uint16), stream.states.astype(np.uint32)
     listed = np.frombuffer(escapes, np.uint8)
@@ -127,14 +128,14 @@ def encode(at: Place, values: Ints, stream: rans.Encoder) -> tuple[Ints, NDArray
 
     Args:
         at: Level to encode.
-        values: int32 [9, h, w] latents.
+        values: int32 [9, h, w] latents, less than `context.LIMIT` in magnitude.
         stream: The encoder to which symbols are added.
 
     Returns:
         int32 [9, h, w] latents as a decoder finds them, and int64 [N] differences that escape.
 
     Raises:
-        FormatError: A latent is out of range.
+        MemoryError: The kernel cannot allocate what it needs.
     """
     h, w = at.support.shape
     most = 9 * int(np.count_nonzero(at.support))

@@ -44,6 +44,9 @@ def finer(
 
     Returns:
         float32 [2 h, 2 w, 3] planes.
+
+    Raises:
+        MemoryError: The kernel cannot allocate what it needs.
     """
     lib = kernel.library()
     assert lib is not None, "check available() first"
