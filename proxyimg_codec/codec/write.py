@@ -13,7 +13,7 @@ from ..model import Picture, Pictured
 from .pack import pack
 
 PADDING = "paDD"
-"""Type of a chunk that only lengthens a file that exceeds the limits of small files [SEC-3].
+"""Type of a chunk that pads a file which is too small for the limits that it needs [SEC-3].
 
 Readers drop it.
 """
