@@ -5,7 +5,7 @@
     image = pxi.open("photo.pxi")
     pixels = image.render(width=1024)
 
-Names are imported when first used: opening and rendering need numpy, encoding needs the
+Names are imported when they are first used: opening and rendering need numpy, encoding needs the
 ``encode`` extra.
 """
 

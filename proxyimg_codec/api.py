@@ -1,7 +1,8 @@
-"""The face of the package: pictures and layers with methods.
+"""Public interface of the package: pictures and layers with methods.
 
-An `Image` is a handle to a `model.Picture`, a `Layer` a picture and a position in it. Both are
-immutable: what changes something gives another one. All that they do is done by functions below.
+An `Image` is a handle to a `model.Picture`; a `Layer` is a handle to one layer of a picture. Both
+are immutable: a method that changes something returns a new image. Their methods only call
+functions of the lower modules.
 """
 
 from __future__ import annotations
@@ -35,15 +36,15 @@ if TYPE_CHECKING:
 
 
 class Image(PictureHandle):
-    """A `.pxi` picture in memory. Equal images have equal files; they pickle as their files.
+    """A `.pxi` picture in memory. Images are equal if their files are, and are pickled as files.
 
     Args:
-        picture: What it is a handle to.
-        cache: Colours that were computed, shared with the images made from this one.
+        picture: The picture as data, or another handle to it.
+        cache: Computed colours to share with other images; by default a new, empty cache.
 
     Attributes:
         picture: The picture as data.
-        cache: Colours that were computed.
+        cache: Computed colours, shared with the images made from this one.
     """
 
     def __init__(self, picture: Pictured, cache: Cache | None = None) -> None:
@@ -52,7 +53,7 @@ class Image(PictureHandle):
 
     @property
     def cache(self) -> Cache:
-        """Colours that were computed, shared with the images made from this one."""
+        """Computed colours, shared with the images made from this one."""
         return self._cache
 
     def __repr__(self) -> str:
@@ -74,67 +75,69 @@ class Image(PictureHandle):
 
     @property
     def layers(self) -> Layers[Layer]:
-        """Layers back to front, addressed by position or by name."""
+        """Layers back to front; a layer is addressed by its position or its name."""
         return Layers(Layer(self, k) for k in range(len(self._picture.layers)))
 
     @property
     def chunks(self) -> tuple[Chunk, ...]:
-        """The chunks of its file but uNDO and TAIL."""
+        """Chunks of the file of this picture, without uNDO and TAIL."""
         return write.state(self)
 
     def _with(self, picture: model.Picture) -> Image:
-        """Another picture that shares the colours that were computed."""
+        """Returns an image of another picture that shares the cache of this one."""
         return Image(picture, self.cache)
 
     def edited(self, *operations: Mapping[str, Any]) -> Image:
-        """The picture after `operations`, in order; each can be undone.
+        """Returns the picture after `operations`, applied in order; each can be undone.
 
         Args:
-            operations: As in an edit script, such as
+            operations: Operations as in an edit script, such as
                 ``{"op": "move", "layer": "cat", "by": [40, -10]}``.
 
         Raises:
-            UsageError: An operation is unknown, or cannot be done.
+            UsageError: An operation is unknown, or cannot be applied.
         """
         from .edit.script import apply
 
         return self._with(apply(self._picture, operations))
 
     def undone(self, steps: int = 1) -> Image:
-        """The picture before its last `steps` edits.
+        """Returns the picture as it was before its last `steps` edits.
 
         Raises:
-            UsageError: There are not as many.
+            UsageError: The history has fewer edits than that.
         """
         from .edit.history import undone
 
         return self._with(undone(self._picture, steps))
 
     def baked(self) -> Image:
-        """The same picture without its history.
+        """Returns the same picture without its history.
 
-        Pixels of a layer that was removed stay in planes that other layers show parts of.
+        Pixels of a removed layer stay in the file if other layers show parts of the same planes.
         """
         return self._with(replace(self._picture, history=()))
 
     def at(self, t: float) -> Image:
-        """The still that a picture that moves is at a time in seconds.
+        """Returns one moment of an animated picture as a still picture.
 
-        Before and after its timeline a picture stays as it is at its ends, unless it loops.
+        Args:
+            t: Time in seconds. A timeline that loops repeats; otherwise a time before its start or
+                after its end counts as its start or end.
 
         Raises:
-            UsageError: The picture has no timeline, or the time is not a number.
+            UsageError: The picture has no timeline, or `t` is not a finite number.
         """
         return self._with(at(self._picture, t))
 
     def animated(
         self, motion: Motion, *, progress: Callable[[int, int], None] | None = None
     ) -> Image:
-        """The picture with another motion, simulated and stored.
+        """Simulates a motion, and returns the picture with it in place of any earlier motion.
 
         Args:
-            motion: What moves, and how: `animate.motion`.
-            progress: Called with the number of simulated frames and of all frames to simulate.
+            motion: Description of the motion; see `animate.motion`.
+            progress: Called with the number of frames simulated so far and of all frames.
 
         Raises:
             UsageError: The motion does not fit the picture.
@@ -161,27 +164,28 @@ class Image(PictureHandle):
         """Renders the picture, or part of it, at any size.
 
         Args:
-            t: Time in seconds, of a picture with a timeline; by default the still is drawn.
-            width: Output columns; with `height` left out, the aspect is kept.
-            height: Output rows.
-            scale: Output pixels a canvas pixel, instead of width and height.
-            region: x, y, width, height in canvas pixels.
-            layers: Names or positions of the layers to draw; all that are not hidden by default.
+            t: Time in seconds in the timeline of the picture; by default the still is drawn.
+            width: Output columns; without `height`, the aspect ratio is kept.
+            height: Output rows; without `width`, the aspect ratio is kept.
+            scale: Output pixels per canvas pixel, instead of `width` and `height`.
+            region: x, y, width, height in canvas pixels; the whole canvas by default.
+            layers: Names or positions of the layers to draw; by default all that are not hidden.
             background: Whether to draw the back layer of an opaque picture.
             dtype: uint8 or uint16 (rounded), or float32 in 0..1.
             engine: ``auto``, ``numpy``, ``native`` or ``ort``.
-            limits: Bounds the output.
-            progress: Called with the number of pixels after each tile.
+            limits: Bounds on the size of the output and on the work it may take.
+            progress: Called after each tile with the number of its pixels.
 
         Returns:
-            [height, width, 3] if the result is opaque by construction, otherwise
-            [height, width, 4] with straight alpha.
+            Pixels of type `dtype`: [height, width, 3] if the picture is opaque and its back layer
+            is drawn, otherwise [height, width, 4] with straight alpha.
 
         Raises:
-            UsageError: A request that makes no sense, an unknown layer, or a time of a picture
-                that does not move.
+            UsageError: The arguments contradict each other or are out of range, a layer is
+                unknown, or `t` is given for a picture without a timeline.
             UnsupportedError: The engine is not installed.
-            LimitError: The output is too large.
+            LimitError: The output is too large, or takes too much work.
+            FormatError: A coded stream that is decoded only now is corrupt.
         """
         return pixels.render(
             self._picture, t=t, width=width, height=height, scale=scale, region=region,
@@ -190,28 +194,29 @@ class Image(PictureHandle):
         )  # fmt: skip
 
     def to_bytes(self) -> bytes:
-        """The picture as a `.pxi` file.
+        """Returns the picture as the bytes of a `.pxi` file.
 
         Raises:
-            LimitError: It is larger than readers accept by default.
+            LimitError: The file would exceed what readers accept by default.
         """
         return write.to_bytes(self)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes the picture to `path`, replacing it in one step.
+        """Writes the picture to a file, which is replaced in one step if it exists.
 
         Raises:
             InputError: The file cannot be written.
+            LimitError: The file would exceed what readers accept by default.
         """
         write_atomically(path, self.to_bytes())
 
 
 class Layer(LayerHandle, Editable[Image]):
-    """One layer of a picture. Its methods edit: each returns a new image.
+    """One layer of a picture. Its methods edit the picture: each returns a new image.
 
     Attributes:
-        image: The picture it belongs to.
-        position: Its place there, counted from the back.
+        image: The picture that the layer belongs to.
+        position: Position of the layer in the picture, counted from the back, from 0.
     """
 
     def __init__(self, image: Image, position: int) -> None:
@@ -220,7 +225,7 @@ class Layer(LayerHandle, Editable[Image]):
 
     @property
     def image(self) -> Image:
-        """The picture it belongs to."""
+        """The picture that the layer belongs to."""
         return self._image
 
     def __repr__(self) -> str:
@@ -240,7 +245,7 @@ class Layer(LayerHandle, Editable[Image]):
 
 
 def _restored(data: bytes, damage: tuple[str, ...]) -> Image:
-    """The image that was pickled."""
+    """Restores a pickled image."""
     return Image(replace(read.from_own_bytes(data), damage=damage))
 
 
@@ -248,15 +253,15 @@ def from_bytes(data: bytes, limits: Limits = DEFAULT_LIMITS, *, tolerant: bool =
     """Decodes a `.pxi` file held in memory.
 
     Args:
-        data: The file.
-        limits: Bounds what is spent on it.
-        tolerant: Whether to make do with what can be decoded of a file that is cut off or damaged.
-            What is wrong is logged as a warning, and stands in `Image.damage`.
+        data: Bytes of the file.
+        limits: Bounds on what decoding the file may cost.
+        tolerant: Whether to decode as much as possible of a truncated or damaged file. The damage
+            is logged as a warning, and described in `Image.damage`.
 
     Raises:
         FormatError: The file breaks the format; or, if `tolerant`, too little of it is left.
-        UnsupportedError: It needs a newer reader.
-        LimitError: It exceeds `limits`.
+        UnsupportedError: The file needs a newer reader.
+        LimitError: The file exceeds `limits`.
     """
     return Image(read.from_bytes(data, limits, tolerant=tolerant))
 
@@ -264,7 +269,12 @@ def from_bytes(data: bytes, limits: Limits = DEFAULT_LIMITS, *, tolerant: bool =
 def open_image(
     path: str | os.PathLike[str], limits: Limits = DEFAULT_LIMITS, *, tolerant: bool = False
 ) -> Image:
-    """Reads a `.pxi` file; see `from_bytes`.
+    """Reads and decodes a `.pxi` file.
+
+    Args:
+        path: Path of the file; ``-`` is standard input.
+        limits: Bounds on what decoding the file may cost.
+        tolerant: As for `from_bytes`.
 
     Raises:
         InputError: The file cannot be read.
@@ -285,21 +295,22 @@ def encode(
     """Encodes a picture.
 
     Args:
-        pixels: [H, W] or [H, W, C] with C = 1 grey, 2 grey and alpha, 3 RGB, 4 RGB and straight
-            alpha; uint8, uint16, or floating point in 0..1.
-        settings: What is asked for; `options` are fields of `Settings` given by name instead.
-        masks: User-given layers back to front; the built-in decomposition otherwise.
-        blocks: Metadata ``icc``, ``exif``, ``xmp`` to carry.
-        progress: Called as work goes on.
-        options: Fields of `Settings`, such as ``quality=70``.
+        pixels: [H, W] or [H, W, C] with C = 1 for grey, 2 for grey and alpha, 3 for RGB, 4 for RGB
+            and alpha; alpha is straight; uint8, uint16, or floating point in 0..1.
+        settings: Settings of the encoder; by default ``Settings()``.
+        masks: Layers given by the user, back to front; by default the encoder finds layers itself.
+        blocks: Metadata blocks to carry: ``icc``, ``exif``, ``xmp``.
+        progress: Called with the name of a stage, and its numbers of units done and in all.
+        options: Fields of `Settings` that replace those of `settings`, such as ``quality=70``.
 
     Returns:
-        The picture as it will be decoded.
+        The picture as a reader will decode it.
 
     Raises:
         InputError: The array cannot be a picture, or a mask does not fit it.
         UsageError: A setting is out of range.
-        UnsupportedError: Something needed is not installed.
+        UnsupportedError: A package that is needed is not installed.
+        LimitError: The picture is larger than readers accept by default.
     """
     try:
         from .encoder import encode as encoder

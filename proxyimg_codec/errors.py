@@ -1,16 +1,16 @@
-"""The error hierarchy. Everything the package raises on purpose is a `PxiError`.
+"""Error classes. Every error that the package raises on purpose is a `PxiError`.
 
-Each class has the exit code that the command-line tools end with.
+Each class holds the exit code with which the command-line tools end.
 """
 
 
 class PxiError(Exception):
-    """Base of all errors: what is wrong, where, and what to do about it.
+    """Base class of all errors; messages say the problem, the place, and the remedy.
 
     Args:
-        message: What is said to the user.
-        rule: Id of the statement of the specification that is broken, such as ``"CON-7"``; empty
-            if there is none.
+        message: Text for the user.
+        rule: Id of the rule of the specification that is broken, such as ``"CON-7"``; empty if
+            there is none.
     """
 
     exit_code = 1
@@ -21,7 +21,7 @@ class PxiError(Exception):
 
 
 class UsageError(PxiError):
-    """An argument, flag or combination of them makes no sense."""
+    """An argument or flag is invalid, or several of them contradict each other."""
 
     exit_code = 2
 
@@ -36,10 +36,10 @@ class FormatError(PxiError):
     """A `.pxi` file breaks a rule of the format.
 
     Args:
-        message: What is wrong.
-        where: The chunk it happened in, such as ``"chunk TEXR"``; empty if not known.
-        offset: Byte offset in the file, or None.
-        rule: As in `PxiError`.
+        message: Description of the problem.
+        where: Name of the chunk, such as ``"chunk TEXR"``; empty if it is not known.
+        offset: Byte offset in the file; None if it is not known.
+        rule: Id of the broken rule, as for `PxiError`.
     """
 
     exit_code = 4
@@ -55,12 +55,12 @@ class FormatError(PxiError):
 
 
 class UnsupportedError(PxiError):
-    """The file or request is legitimate, but this version or installation cannot do it."""
+    """The file or request is valid, but this version or installation does not support it."""
 
     exit_code = 5
 
 
 class LimitError(PxiError):
-    """The file or request exceeds a limit; `Limits` says which and how to raise it."""
+    """The file or request exceeds one of the `Limits`; the message says which, and the remedy."""
 
     exit_code = 6

@@ -1,6 +1,6 @@
-"""Handles: what they show of the pictures and layers that they stand for.
+"""Base classes of the handles to pictures and layers: read-only access to their fields.
 
-`api` adds what can be done with these.
+`api` adds the methods that edit, render and save.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from .texture.pyramid import Texture
 
 
 class PictureHandle:
-    """A handle to a picture, which shows its fields.
+    """Handle to a picture, with read-only access to its fields.
 
     Attributes:
         picture: The picture as data.
@@ -50,17 +50,17 @@ class PictureHandle:
 
     @property
     def channels(self) -> int:
-        """3, or 4 if textures also give alpha."""
+        """Number of texture channels: 3, or 4 if textures may also give alpha."""
         return self._picture.channels
 
     @property
     def opaque(self) -> bool:
-        """Whether the back layer covers the whole canvas, so that output has no alpha."""
+        """Whether the back layer covers the canvas without alpha, so that output has no alpha."""
         return self._picture.opaque
 
     @property
     def depth(self) -> int:
-        """Bits a sample of the original, 8 or 16."""
+        """Bits per sample of the original picture, 8 or 16."""
         return self._picture.depth
 
     @property
@@ -75,45 +75,45 @@ class PictureHandle:
 
     @property
     def info(self) -> Mapping[str, Any] | None:
-        """Encoder, settings and areas, as in the iNFO chunk, or None."""
+        """Fields of the iNFO chunk: encoder, settings and areas; None if there is no such chunk."""
         return self._picture.info
 
     @property
     def extra(self) -> tuple[Chunk, ...]:
-        """Unknown ancillary chunks, carried along."""
+        """Unknown ancillary chunks, which are carried along."""
         return self._picture.extra
 
     @property
     def groups(self) -> Mapping[str, str | None]:
-        """Parent of each group of layers, a name or None, by the group's name."""
+        """Groups of layers: the name of the parent group or layer, or None, by the group's name."""
         return self._picture.groups
 
     @property
     def timeline(self) -> Timeline | None:
-        """When layers that have a track move, or None."""
+        """Timeline that the tracks of layers refer to; None if the picture has no motion."""
         return self._picture.timeline
 
     @property
     def history(self) -> tuple[Step, ...]:
-        """The edits that led here, oldest first, each with the state before it."""
+        """Edits that led to this state, oldest first, each with the state before it."""
         return self._picture.history
 
     @property
     def damage(self) -> tuple[str, ...]:
-        """What was wrong with the file it was read from, where that was tolerated."""
+        """Damage that was tolerated when the file was read, one sentence each."""
         return self._picture.damage
 
     @property
     def planes(self) -> list[Planes]:
-        """The planes that textures show, in the order of their first use."""
+        """Planes of all rasters that pyramid textures show, in the order of their first use."""
         return self._picture.planes
 
 
 class LayerHandle:
-    """A handle to a layer: a picture and a position in it. It shows the fields of the layer.
+    """Handle to a layer, given by its picture and position, with read-only access to its fields.
 
     Attributes:
-        position: Its place in the picture, counted from the back.
+        position: Position of the layer in the picture, counted from the back, from 0.
     """
 
     def __init__(self, picture: Picture, position: int) -> None:
@@ -122,7 +122,7 @@ class LayerHandle:
 
     @property
     def position(self) -> int:
-        """Its place in the picture, counted from the back."""
+        """Position of the layer in the picture, counted from the back, from 0."""
         return self._position
 
     @property
@@ -132,60 +132,60 @@ class LayerHandle:
 
     @property
     def name(self) -> str:
-        """The name, unique in the picture."""
+        """Name of the layer, unique in the picture."""
         return self.data.name
 
     @property
     def box(self) -> Box:
-        """x, y, width, height of the texture's rectangle in canvas pixels."""
+        """Rectangle of the texture at rest: x, y, width, height in canvas pixels."""
         return self.data.box
 
     @property
     def boundary(self) -> Boundary | None:
-        """Closed paths at rest, or None for the whole canvas."""
+        """Boundary of the layer at rest; None for the whole canvas."""
         return self.data.boundary
 
     @property
     def outline(self) -> Boundary | None:
-        """The boundary in its present place; None for the whole canvas."""
+        """Boundary in its present place, after the pose; None for the whole canvas."""
         return neighbours.present_outline(self._picture, self.data)
 
     @property
     def texture(self) -> Texture:
-        """Codes and the index of their network, or a view of planes."""
+        """Texture: codes and the index of their network, or a view of planes."""
         return self.data.texture
 
     @property
     def network(self) -> Network | None:
-        """What decodes its texture; None where that is no network of the file."""
+        """Decoder network of the texture; None for pyramid textures."""
         return self._picture.network_of(self.data)
 
     @property
     def mesh(self) -> Mesh | None:
-        """Proxy nodes, or None."""
+        """Mesh of proxy nodes; None if the layer has none."""
         return self.data.mesh
 
     @property
     def sampling(self) -> int:
-        """How features are found: 0 direct, 1 to 3 at the proxy nodes."""
+        """Number of the sampling mode: 0 direct; 1 local and global, 2 local, 3 global feature."""
         return self.data.sampling
 
     @property
     def pose(self) -> Pose:
-        """What edits have done to it."""
+        """Pose of the layer: the result of all edits of its place, shape and colour."""
         return self.data.pose
 
     @property
     def parent(self) -> str | None:
-        """Name of the layer or group that it follows, or None."""
+        """Name of the layer or group that the layer moves with; None if there is none."""
         return self.data.parent
 
     @property
     def track(self) -> Track | None:
-        """How its nodes move over the timeline of the picture, or None."""
+        """Motion of the nodes over the timeline of the picture; None if the layer does not move."""
         return self.data.track
 
     @property
     def moved_neighbours(self) -> Moved:
-        """What no longer lies to it as it did when the samples of its view were mixed."""
+        """Layers and boundaries that have moved relative to this layer since its view was cut."""
         return neighbours.moved_neighbours(self._picture, self.data)

@@ -1,8 +1,8 @@
-"""What a reader is willing to spend on a file. Every number read from a file is checked here.
+"""Limits on the time and memory that a reader spends on a file or picture.
 
-What a file asks for is added up over all its parts, before it is done: whoever decodes a file, or
-draws a picture, makes one `Budget` of the limits, which all stages draw from. Public functions take
-`Limits`; what takes a `Budget` is one of those stages.
+The cost of every part of a file is added up before the part is decoded. A function that decodes a
+whole file, or draws a picture, makes one `Budget` of the limits, and all its stages spend from it.
+Public functions take `Limits`; a function that takes a `Budget` is one of those stages.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from dataclasses import dataclass, fields
 from .errors import LimitError
 
 SAMPLE_COST_BITS = 10
-"""A sample of a layer counts as 2**SAMPLE_COST_BITS multiplications."""
+"""Cost of a sample of a layer: 2**SAMPLE_COST_BITS multiplications."""
 
 
 SMALL_FILE = 1 << 20
-"""Up to this size in bytes a file is small: it may hold less, whose `Limits` begin with `small`."""
+"""Largest size in bytes of a small file, for which the stricter limits ``small_...`` hold too."""
 
 
 @dataclass(frozen=True)
@@ -26,36 +26,37 @@ class Limits:
 
     Attributes:
         file_bytes: Size of a file.
-        chunks: Chunks in a file, with those of its history.
+        chunks: Chunks in a file, including those of its history.
         side: Canvas width or height in pixels.
         layers: Layers in a file.
         networks: Decoder networks in a file.
         segments: Bézier segments in all boundaries together.
-        gates: Gates of all meshes together: steps of decoding their connectivity.
+        gates: Gates of all meshes together; a gate is a step of decoding the connectivity.
         small_gates: The same in a file of at most `SMALL_FILE` bytes.
         faces: Triangles of all refined meshes together.
-        overlap: How often, in the mean, the triangles of a deformed layer may cover a sample.
-        beyond: Pairs that are compared of a face and a point that no face of a mesh holds, of all
-            layers together; and of a face and 48 control points that ride on the mesh.
+        overlap: Average number of triangles of a deformed layer that cover a sample.
+        beyond: Pairs of a face and a sample outside the mesh whose distances are compared, of all
+            layers together; likewise pairs of a face and a run of 48 control points of a boundary
+            that follows the mesh.
         codes: Scalar codes of all textures and cells of all masks together, stored or not.
         small_codes: The same in a file of at most `SMALL_FILE` bytes.
         samples: Raster samples of all planes together.
         small_samples: The same in a file of at most `SMALL_FILE` bytes.
-        filled: Raster samples of all parts that are shown with a mask or cuts, which may have to be
-            filled.
-        covered: Raster samples of all parts that boundaries cut, once for each of these, and for
-            each layer behind one that cuts itself.
-        wavefronts: Columns plus twice the rows of all planes of codes, masks, and the curves and
-            shapes of a motion, and plus thrice the rows of rasters: steps of decoding them.
+        filled: Raster samples of all views with a mask or cuts; hidden ones may have to be filled.
+        covered: Raster samples of all views with cuts, counted once for each boundary that cuts;
+            and if the layer's own boundary cuts, once more for each layer behind it.
+        wavefronts: Steps of decoding arrays: columns plus twice the rows, of all planes of codes,
+            masks, and curves and shapes of a motion; of rasters columns plus thrice the rows.
         motion: Coefficients of all curves, and coordinates of all shapes, together.
         parameters: Parameters of all networks together.
         metadata_bytes: Metadata, history and script together, after decompression.
         references: Chunks of all states of a history together.
         output_pixels: Pixels of one rendered picture.
-        multiply_adds: Multiplications of the networks of one rendered picture, 2^7 for each feature
-            of an anchor that a sample is made of, and 2^10 for each sample of each layer, each
-            triangle, and each sample that it holds.
-        work: Edges of boundaries, and their pieces in rows and samples, of one rendered picture.
+        multiply_adds: Multiplications for one rendered picture: those of the networks; 2^7 for each
+            feature of each anchor, for each sample of a layer with a global feature; 2^10 for each
+            sample of each layer, for each triangle, and for each sample in a triangle.
+        work: Edges of flattened boundaries, and their pieces in rows and in samples, of one
+            rendered picture.
     """
 
     file_bytes: int = 1 << 30
@@ -96,11 +97,11 @@ class Limits:
 
 
 class Budget:
-    """Limits of which all that is done for one file, or for one picture, is taken.
+    """Running account of what was spent of the limits for one file or one rendered picture.
 
     Attributes:
-        limits: What may be spent.
-        spent: What was spent so far, by the name of its limit.
+        limits: The limits.
+        spent: Amount spent so far, by the name of the limit.
     """
 
     def __init__(self, limits: Limits | None = None) -> None:
@@ -115,7 +116,7 @@ class Budget:
         """Spends `amount` of the limit called `name`.
 
         Raises:
-            LimitError: Together with what was spent before it exceeds the limit.
+            LimitError: The sum of this and all earlier amounts exceeds the limit.
         """
         self.spent[name] += amount
         self.check(name, self.spent[name])
@@ -123,16 +124,16 @@ class Budget:
             self.check(SMALL[name], self.spent[name])
 
     def left(self, name: str) -> int:
-        """How much may still be spent of the limit called `name`."""
+        """Amount that may still be spent of the limit called `name`."""
         return int(getattr(self.limits, name)) - self.spent[name]
 
     def fits_small(self) -> bool:
-        """Whether a small file may hold what was spent."""
+        """Whether the amounts spent are within the limits of small files."""
         limits = self.limits
         return all(self.spent[name] <= getattr(limits, small) for name, small in SMALL.items())
 
 
 SMALL = {f.name.removeprefix("small_"): f.name for f in fields(Limits) if "small_" in f.name}
-"""The limits of small files, by the limits that they are stricter than."""
+"""Names of the limits of small files, by the names of the general limits that they tighten."""
 
 DEFAULT_LIMITS = Limits()

@@ -1,7 +1,8 @@
-"""The decoded picture as data: frozen values that know nothing of what is done with them.
+"""The decoded picture as frozen data without behaviour.
 
-Bytes (`codec`), pixels (`render`), edits (`edit`) and motion (`animate`) are functions of these; a
-`Layer` does not know its `Picture`. What people use is `api`: handles with methods on top.
+Functions elsewhere turn it into bytes (`codec`) and pixels (`render`), edit it (`edit`) and animate
+it (`animate`). A `Layer` has no reference to its `Picture`. Users work with the handles of `api`,
+which add methods.
 """
 
 from __future__ import annotations
@@ -25,18 +26,18 @@ from .texture.pyramid import PyramidTexture, Texture
 
 
 class Named(Protocol):
-    """Anything with a name."""
+    """Protocol of objects with a name."""
 
     @property
     def name(self) -> str:
-        """The name."""
+        """Name of the object."""
 
 
 L_co = TypeVar("L_co", bound=Named, covariant=True)
 
 
 class Layers(Sequence[L_co]):
-    """Layers back to front, addressed by position or by name."""
+    """Sequence of layers, back to front; a layer is addressed by its position or its name."""
 
     def __init__(self, layers: Iterable[L_co]) -> None:
         self._layers = tuple(layers)
@@ -54,7 +55,7 @@ class Layers(Sequence[L_co]):
     def __getitem__(self, key: slice) -> tuple[L_co, ...]: ...
 
     def __getitem__(self, key: int | str | slice) -> L_co | tuple[L_co, ...]:
-        """The layer at a position or with a name, or the layers of a slice.
+        """Returns the layer at a position or with a name, or the layers of a slice as a tuple.
 
         Raises:
             UsageError: There is no such layer.
@@ -76,15 +77,16 @@ class Layer:
     """One layer.
 
     Attributes:
-        name: Unique in the picture.
-        box: x, y, width, height of the texture's rectangle in canvas pixels.
-        boundary: Closed paths at rest, or None for the whole canvas.
+        name: Name of the layer, unique in the picture.
+        box: Rectangle of the texture at rest: x, y, width, height in canvas pixels.
+        boundary: Boundary at rest; None for the whole canvas.
         texture: Codes and the index of their network, or a view of planes.
-        mesh: Proxy nodes, or None.
-        sampling: How features are found: 0 direct, 1 to 3 at the proxy nodes.
-        pose: What edits have done to it.
-        parent: Name of the layer or group that it follows, or None.
-        track: How its nodes move over the timeline of the picture, or None.
+        mesh: Mesh of proxy nodes, or None.
+        sampling: Number of the sampling mode: 0 direct; 1 local and global, 2 local, 3 global
+            feature.
+        pose: Result of all edits of place, shape and colour.
+        parent: Name of the layer or group that the layer moves with, or None.
+        track: Motion of the nodes over the timeline of the picture, or None.
     """
 
     name: str
@@ -104,19 +106,20 @@ class Picture:
 
     Attributes:
         width: Canvas width in pixels.
-        height: Canvas height.
-        channels: 3, or 4 if textures also give alpha.
-        opaque: Whether the back layer covers the whole canvas, so that output has no alpha.
-        depth: Bits a sample of the original, 8 or 16.
+        height: Canvas height in pixels.
+        channels: Number of texture channels: 3, or 4 if textures may also give alpha.
+        opaque: Whether the back layer covers the whole canvas without alpha, so that output has no
+            alpha.
+        depth: Bits per sample of the original picture, 8 or 16.
         layers: Layers back to front.
         networks: Decoder networks.
         blocks: Metadata blocks ``icc``, ``exif``, ``xmp``.
-        info: Encoder, settings and areas, as in the iNFO chunk, or None.
-        extra: Unknown ancillary chunks, carried along.
-        groups: Parent of each group of layers, a name or None, by the group's name.
-        timeline: When layers that have a track move, or None.
-        history: The edits that led here, oldest first, each with the state before it.
-        damage: What was wrong with the file it was read from, where that was tolerated.
+        info: Fields of the iNFO chunk (encoder, settings and areas), or None.
+        extra: Unknown ancillary chunks, which are carried along.
+        groups: Name of the parent group or layer of each group, or None, by the group's name.
+        timeline: Timeline that the tracks of layers refer to; None if nothing moves.
+        history: Edits that led to this state, oldest first, each with the state before it.
+        damage: Descriptions of the damage that was tolerated when the file was read.
     """
 
     width: int
@@ -149,7 +152,7 @@ class Picture:
 
     @property
     def picture(self) -> Picture:
-        """Itself: functions take whatever has a picture, such as `api.Image`."""
+        """This picture itself, so that functions can take a picture or a handle to one."""
         return self
 
     @property
@@ -159,19 +162,19 @@ class Picture:
 
     @property
     def planes(self) -> list[Planes]:
-        """The planes that textures show, in the order of their first use."""
+        """Planes of all rasters that pyramid textures show, in the order of their first use."""
         views = (v.texture for v in self.layers if isinstance(v.texture, PyramidTexture))
         return list(dict.fromkeys(source for view in views for source in view.sources))
 
     def network_of(self, layer: Layer) -> Network | None:
-        """The network that decodes the texture of one of its layers; None for views of planes."""
+        """Network that decodes the texture of `layer`; None for pyramid textures."""
         number = layer.texture.network
         return None if number is None else self.networks[number]
 
 
 class Pictured(Protocol):
-    """A `Picture`, or a handle to one, such as `api.Image`."""
+    """Protocol of a `Picture` and of handles to one, such as `api.Image`."""
 
     @property
     def picture(self) -> Picture:
-        """The picture."""
+        """The picture as data."""

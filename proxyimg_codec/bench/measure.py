@@ -1,8 +1,8 @@
-"""How far a decoded picture is from its original, and how far one codec's curve from another's.
+"""Quality of decoded pictures (PSNR, MS-SSIM), and comparison of rate-distortion curves (BD-rate).
 
-Pictures are uint8 [H, W, 3] RGB or [H, W, 4] RGB with straight alpha. One with alpha is judged as
-it looks on black and on white, the two averaged: errors of alpha count, colour that nobody can see
-does not.
+Pictures are uint8 [H, W, 3] RGB, or [H, W, 4] RGB with straight alpha. A picture with alpha is
+judged over black and over white, and the two results are averaged. So errors of alpha count, and
+the colour of invisible pixels does not.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Pixels = NDArray[np.uint8]
 Floats = NDArray[np.float64]
 
 PSNR_CAP = 60.0
-"""PSNR of an exact picture in dB, and the most that any gets; as libvmaf for 8 bits."""
+"""Upper bound of PSNR in dB, and its value for an exact picture; that of libvmaf for 8 bits."""
 
 SCALE_WEIGHTS = (0.0448, 0.2856, 0.3001, 0.2363, 0.1333)
 """Exponents of MS-SSIM, finest scale first (Wang, Simoncelli and Bovik 2003)."""
@@ -29,33 +29,34 @@ WINDOW = 11
 
 
 def psnr(a: Pixels, b: Pixels) -> float:
-    """PSNR in dB over all samples of RGB, at most `PSNR_CAP`."""
+    """PSNR in dB of two pictures of the same size over all RGB samples, at most `PSNR_CAP`."""
     errors = [float(((x - y) ** 2).mean()) for x, y in _seen(a, b)]
     error = sum(errors) / len(errors)
     return min(PSNR_CAP, 10 * math.log10(255**2 / error)) if error else PSNR_CAP
 
 
 def ms_ssim(a: Pixels, b: Pixels) -> float:
-    """MS-SSIM 0..1 of Wang, Simoncelli and Bovik (2003), mean of the channels of RGB.
+    """MS-SSIM of two pictures of the same size (Wang, Simoncelli and Bovik 2003).
 
-    Five scales, each half as large as the one before; a picture whose shorter side is below
-    176 pixels has as many as hold the window, with exponents scaled to the same sum.
-    Negative structure counts as none.
+    There are five scales, each half as large as the one before. A picture whose shorter side is
+    below 176 pixels has only those that hold the window, with exponents scaled to the same sum. A
+    negative structure term counts as 0.
 
     Returns:
-        The index; NaN if the picture is smaller than the window.
+        The mean of the indices of the RGB channels, 0..1; NaN if the picture is smaller than the
+        window.
     """
     values = [_ms_ssim(x, y) for x, y in _seen(a, b)]
     return sum(values) / len(values)
 
 
 def decibel(index: float) -> float:
-    """MS-SSIM on a scale where equal steps look alike: −10·log10(1 − index), at most 60."""
+    """MS-SSIM in dB, where equal steps look alike: −10·log10(1 − index), at most `PSNR_CAP`."""
     return min(PSNR_CAP, -10 * math.log10(max(1 - index, 1e-9)))
 
 
 def _seen(a: Pixels, b: Pixels) -> list[tuple[Floats, Floats]]:
-    """The pairs of opaque pictures that are compared, 0..255."""
+    """Pairs of opaque pictures to compare, 0..255: one, or two over black and white."""
     if a.shape[2] == b.shape[2] == 3:
         return [(a.astype(np.float64), b.astype(np.float64))]
     return [(_over(a, ground), _over(b, ground)) for ground in (0.0, 255.0)]
@@ -87,7 +88,7 @@ def _ms_ssim(x: Floats, y: Floats) -> float:
 
 
 def _ssim(x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """The luminance term and the product of contrast and structure, where the window fits."""
+    """Luminance term, and product of contrast and structure, at pixels where the window fits."""
     c1, c2 = (0.01 * 255) ** 2, (0.03 * 255) ** 2
     mx, my = _blurred(x), _blurred(y)
     vx, vy, vxy = _blurred(x * x) - mx * mx, _blurred(y * y) - my * my, _blurred(x * y) - mx * my
@@ -104,7 +105,7 @@ def _blurred(x: Floats) -> Floats:
 
 
 def _halved(x: Floats) -> Floats:
-    """Means of 2x2 pixels; an odd last row or column is left out."""
+    """Means of 2x2 pixels; the last row or column of an odd size is dropped."""
     h, w = (n // 2 * 2 for n in x.shape[:2])
     return np.asarray(x[:h, :w].reshape(h // 2, 2, w // 2, 2, -1).mean((1, 3)))
 
@@ -114,21 +115,21 @@ def bd_rate(
     anchor: Sequence[tuple[float, float]],
     rates: tuple[float, float] = (0.0, math.inf),
 ) -> float:
-    """Bits that a codec needs more than the anchor at equal quality, in per cent.
+    """Bjøntegaard delta rate: extra bits of a codec over an anchor at equal quality, in per cent.
 
-    Bjøntegaard's measure (VCEG-M33, 2001) with monotone cubic interpolation of log rate over
-    quality (VCEG-AI11, and the pchip of the JVET tools): the mean difference of log rate over all
-    qualities that both curves reach at a rate within `rates`.
+    The mean difference of log rate (VCEG-M33, 2001), with monotone cubic interpolation of log rate
+    over quality (VCEG-AI11, and the pchip of the JVET tools), over all qualities that both curves
+    reach at a rate within `rates`.
 
     Args:
         curve: Pairs of rate > 0 and quality in dB, in any order. Points that cost more than
-            another and are no better are left out.
-        anchor: The same of the codec to compare with.
-        rates: Least and greatest rate to look at.
+            another point and are no better are left out.
+        anchor: Pairs of the codec to compare with.
+        rates: Least and greatest rate to consider.
 
     Returns:
-        Negative if the codec is better; NaN if the curves have no quality in common, or one of
-        them fewer than two points.
+        The difference in per cent, negative if the codec is better; NaN if the curves have no
+        quality in common, or one of them has fewer than two points.
     """
     spans = [_span(front(c), rates) for c in (curve, anchor)]
     low, high = max(s[0] for s in spans), min(s[1] for s in spans)
@@ -142,7 +143,7 @@ def bd_rate(
 
 
 def quality_at(curve: Sequence[tuple[float, float]], rate: float) -> float:
-    """Quality in dB of a curve at a rate, interpolated as in `bd_rate`; NaN outside of it."""
+    """Quality in dB of a curve at a rate, interpolated as in `bd_rate`; NaN beyond its ends."""
     points = front(curve)
     if not points or not points[0][0] <= rate <= points[-1][0]:
         return math.nan
@@ -150,7 +151,10 @@ def quality_at(curve: Sequence[tuple[float, float]], rate: float) -> float:
 
 
 def smooth(curve: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """The curve that `bd_rate` compares, at 400 qualities; empty for less than two points."""
+    """Points (rate, quality) of the interpolated curve that `bd_rate` compares, at 400 qualities.
+
+    Empty if the curve has fewer than two points.
+    """
     points = front(curve)
     if len(points) < 2:
         return []
@@ -160,7 +164,7 @@ def smooth(curve: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
 
 
 def front(curve: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """The finite points of a curve that are better than all cheaper ones, by rate."""
+    """Finite points of a curve that are better than all cheaper ones, by ascending rate."""
     kept: list[tuple[float, float]] = []
     for rate, quality in sorted(curve, key=lambda p: (p[0], -p[1])):
         if math.isfinite(quality) and (not kept or quality > kept[-1][1]):
@@ -169,7 +173,7 @@ def front(curve: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
 
 
 def _span(points: Sequence[tuple[float, float]], rates: tuple[float, float]) -> tuple[float, float]:
-    """Least and greatest quality of a curve within the rates; an empty span if there is none."""
+    """Least and greatest quality of a curve within the rates; (inf, -inf) if there is none."""
     if len(points) < 2 or points[0][0] > rates[1] or points[-1][0] < rates[0]:
         return math.inf, -math.inf
     low = points[0][1] if rates[0] <= points[0][0] else _quality(points, rates[0])
@@ -178,7 +182,7 @@ def _span(points: Sequence[tuple[float, float]], rates: tuple[float, float]) -> 
 
 
 def _quality(points: Sequence[tuple[float, float]], rate: float) -> float:
-    """The quality at which the curve has this rate, within its ends."""
+    """Quality at which a curve has a rate between those of its ends."""
     grid = np.linspace(points[0][1], points[-1][1], 4001)
     return float(np.interp(math.log(rate), _log_rate(points, grid), grid))
 
@@ -192,9 +196,12 @@ def pchip(x: Floats, y: NDArray[Any], at: Floats) -> Floats:
     """Monotone cubic interpolation (Fritsch and Butland 1984; ends as in Moler's pchip).
 
     Args:
-        x: Increasing knots, at least two.
-        y: Values at the knots.
-        at: Where to interpolate, within the knots.
+        x: float64 [n] increasing knots, n >= 2.
+        y: Values [n] at the knots.
+        at: float64 [m] positions between the first and the last knot.
+
+    Returns:
+        float64 [m] values at these positions.
     """
     h, slope = np.diff(x), np.diff(y) / np.diff(x)
     tangent = np.full(len(x), slope[0])
@@ -213,7 +220,7 @@ def pchip(x: Floats, y: NDArray[Any], at: Floats) -> Floats:
 
 
 def _end(h0: float, h1: float, s0: float, s1: float) -> float:
-    """Tangent at an end: three points, limited so that the curve stays monotone."""
+    """Tangent at an end, from three points, limited so that the curve stays monotone."""
     tangent = ((2 * h0 + h1) * s0 - h0 * s1) / (h0 + h1)
     if tangent * s0 <= 0:
         return 0.0

@@ -1,4 +1,4 @@
-"""The codecs that are compared: a table with one entry each."""
+"""Table of the codecs that are compared."""
 
 from __future__ import annotations
 
@@ -19,30 +19,30 @@ from ..errors import UsageError
 Pixels = NDArray[np.uint8]
 
 EFFORT, FAST_EFFORT = 5, 2
-"""Efforts of our own codec: the default, and that of ``pxi-fast``."""
+"""Efforts of our own codec: of ``pxi`` by default, and of ``pxi-fast``."""
 
 
 @dataclass(frozen=True)
 class Codec:
     """One codec with fixed settings.
 
-    Everything in it can be pickled, for it is called in other processes.
+    All its attributes can be pickled, because it is called in other processes.
 
     Attributes:
-        name: What the command line and the tables call it.
-        label: What plots call it.
-        settings: What is fixed, in words.
-        qualities: Qualities by default, in the codec's own measure; on photographs they lead to
-            0.1 to 1.5 bits a pixel.
+        name: Name on the command line and in tables.
+        label: Name in plots.
+        settings: Description of the fixed settings.
+        qualities: Default qualities in the codec's own measure; on photographs they lead to 0.1 to
+            1.5 bits per pixel.
         limits: Least and greatest quality.
-        encode: The whole file of uint8 [H, W, 3 or 4] at a quality; takes ``masks`` if the field
-            of that name is set.
-        decode: uint8 [H, W, 3 or 4] of a file.
-        version: Version of the libraries behind it.
-        whole: Qualities are whole numbers.
-        alpha: It can code transparency.
-        masks: It codes the layers of label maps.
-        default: It runs if the command line does not name codecs.
+        encode: Function from uint8 [H, W, 3 or 4] and a quality to a whole file; it also takes
+            ``masks`` if the attribute of that name is set.
+        decode: Function from a file to uint8 [H, W, 3 or 4].
+        version: Function that returns the versions of the libraries behind the codec.
+        whole: Whether qualities are whole numbers.
+        alpha: Whether the codec can code transparency.
+        masks: Whether the codec codes the layers of label maps.
+        default: Whether the codec runs if the command line names no codecs.
     """
 
     name: str
@@ -59,10 +59,10 @@ class Codec:
     default: bool = True
 
     def checked(self, quality: float) -> float:
-        """The quality, if the codec knows it.
+        """Checks a quality, and returns it.
 
         Raises:
-            UsageError: It is out of range, or should be a whole number.
+            UsageError: The quality is out of range, or should be a whole number.
         """
         low, high = self.limits
         if not low <= quality <= high or (self.whole and quality != round(quality)):
@@ -74,7 +74,7 @@ class Codec:
 
 
 def pillow_encode(pixels: Pixels, quality: float, *, kind: str, **options: Any) -> bytes:
-    """A file of one of Pillow's formats."""
+    """Encodes a picture uint8 [H, W, 3 or 4] as a file of type `kind` with Pillow."""
     from PIL import Image
 
     file = io.BytesIO()
@@ -83,7 +83,7 @@ def pillow_encode(pixels: Pixels, quality: float, *, kind: str, **options: Any) 
 
 
 def jpeg2000_encode(pixels: Pixels, quality: float) -> bytes:
-    """A JPEG 2000 file of `quality` bits a pixel: 9/7 wavelet, colour transform."""
+    """Encodes a JPEG 2000 file at `quality` bits per pixel: 9/7 wavelet, colour transform."""
     from PIL import Image
 
     file = io.BytesIO()
@@ -95,7 +95,7 @@ def jpeg2000_encode(pixels: Pixels, quality: float) -> bytes:
 
 
 def pillow_decode(data: bytes) -> Pixels:
-    """The picture in a file that Pillow reads."""
+    """Decodes a file with Pillow to uint8 [H, W, 3 or 4]."""
     from PIL import Image
 
     with Image.open(io.BytesIO(data)) as image:
@@ -104,14 +104,14 @@ def pillow_decode(data: bytes) -> Pixels:
 
 
 def jpegxl_encode(pixels: Pixels, quality: float) -> bytes:
-    """A JPEG XL file at libjxl's quality."""
+    """Encodes a JPEG XL file at a quality of libjxl, with effort 7."""
     import imagecodecs
 
     return bytes(imagecodecs.jpegxl_encode(pixels, int(quality), effort=7, numthreads=1))
 
 
 def jpegxl_decode(data: bytes) -> Pixels:
-    """The picture in a JPEG XL file."""
+    """Decodes a JPEG XL file to uint8."""
     import imagecodecs
 
     return np.asarray(imagecodecs.jpegxl_decode(data, numthreads=1), np.uint8)
@@ -120,7 +120,7 @@ def jpegxl_decode(data: bytes) -> Pixels:
 def pxi_encode(
     pixels: Pixels, quality: float, *, masks: Sequence[Any] | None = None, **options: Any
 ) -> bytes:
-    """A .pxi file, on one thread; of one layer if there are no masks."""
+    """Encodes a .pxi file on one thread, with one layer if there are no masks."""
     from ..api import encode
 
     if masks is None:
@@ -130,14 +130,14 @@ def pxi_encode(
 
 
 def pxi_decode(data: bytes) -> Pixels:
-    """The picture in a .pxi file."""
+    """Decodes a .pxi file to uint8 [H, W, 3 or 4]."""
     from ..api import from_bytes
 
     return np.asarray(from_bytes(data).render())
 
 
 def pillow_version(feature: str) -> str:
-    """Pillow's version and that of the library behind a format."""
+    """Versions of Pillow and of the library behind one of its formats."""
     from PIL import __version__ as pillow
     from PIL import features
 
@@ -150,7 +150,7 @@ def pillow_version(feature: str) -> str:
 
 
 def jpegxl_version() -> str:
-    """Version of libjxl."""
+    """Versions of imagecodecs and libjxl."""
     import imagecodecs
 
     return f"imagecodecs {imagecodecs.__version__}, {imagecodecs.jpegxl_version()}"
@@ -159,7 +159,7 @@ def jpegxl_version() -> str:
 def pxi_version() -> str:
     """Version of this package with a hash of its code and weights, which change between releases.
 
-    Measurements are reused only if it agrees.
+    Measurements of an earlier run are reused only if this is the same.
     """
     root, hasher = Path(__file__).parents[1], hashlib.sha256()
     apart = {"__pycache__", "bench", "cli", "edit", "export"}
@@ -178,7 +178,7 @@ PXI_QUALITIES = (20.0, 31.0, 43.0, 55.0, 67.0)
 
 
 def avif(name: str, label: str, speed: int, subsampling: str, default: bool = True) -> Codec:
-    """AVIF by libaom, tuned for PSNR: what Pillow does by default is tuned for the eye."""
+    """Entry for AVIF by libaom, tuned for PSNR; Pillow's default is tuned for perception."""
     encode = partial(
         pillow_encode, kind="AVIF", codec="aom", speed=speed, subsampling=subsampling,
         advanced={"tune": "psnr"}, max_threads=1, autotiling=False,
@@ -194,7 +194,7 @@ def pxi(
     name: str, label: str, effort: int, texture: str = "pyramid", *,
     masks: bool = False, default: bool = True,
 ) -> Codec:  # fmt: skip
-    """Our own codec."""
+    """Entry for our own codec."""
     layers = "layers of the label maps" if masks else "one layer"
     return Codec(
         name, label, f"{texture}, effort {effort}, {layers}", PXI_QUALITIES, (0, 100),
@@ -204,7 +204,7 @@ def pxi(
 
 
 def codecs(effort: int = EFFORT) -> dict[str, Codec]:
-    """All codecs by name, in the order of the tables; `effort` is that of ours."""
+    """All codecs by name, in the order of the tables; `effort` is the effort of our own."""
     table = [
         Codec(
             "jpeg", "JPEG", "4:2:0, optimized Huffman tables",

@@ -18,14 +18,14 @@ COLOURS = {
     "avif420": "#76a9d8", "avif444": "#2b6cb0", "avif420-s0": "#17365c",
     "pxi": "#d62728", "pxi-fast": "#f08a7c", "pxi-masks": "#8c1515", "pxi-implicit": "#ff9f40",
 }  # fmt: skip
-"""Warm reds for our codec, one quiet colour for each of the others."""
+"""Colours of the curves: warm reds for our codec, a quiet colour for each of the others."""
 
 OTHER, PUBLISHED = "#444444", "#8a8a8a"
 
 STYLE: Any = {
     "font.size": 9, "axes.edgecolor": "#666666", "svg.hashsalt": "pxi", "svg.fonttype": "none",
 }  # fmt: skip
-"""Of all plots; with a salt of its own the same plot gives the same SVG file."""
+"""Style of all plots; the fixed salt makes the same plot give the same SVG file."""
 
 AXES = {"PSNR": "RGB PSNR (dB)", "MS-SSIM": "MS-SSIM (dB, −10 log₁₀(1 − MS-SSIM))"}
 
@@ -33,14 +33,14 @@ AXES = {"PSNR": "RGB PSNR (dB)", "MS-SSIM": "MS-SSIM (dB, −10 log₁₀(1 − 
 def draw(
     results: Sequence[Results], metric: str, title: str, most: float, paths: Sequence[Path]
 ) -> None:
-    """Draws the averaged curves up to `most` bits a pixel, each named at its end.
+    """Draws the averaged curves up to `most` bits per pixel, with its name at the end of each.
 
     Args:
         results: The codecs; published curves are thin and dashed.
         metric: ``PSNR`` or ``MS-SSIM``.
-        title: Above the plot.
-        most: Right end of the plot in bits a pixel.
-        paths: Where to write it, type by suffix.
+        title: Title above the plot.
+        most: Right end of the plot in bits per pixel.
+        paths: Files to write, whose suffixes decide the types.
     """
     import matplotlib
     from matplotlib.figure import Figure
@@ -55,7 +55,7 @@ def draw(
         for one, curve in shown:
             points = [p for p in curve if p[0] <= most]
             line = [p for p in smooth(curve) if p[0] <= most]
-            # Lines are interpolated as for BD-rates; dots are what was measured.
+            # Lines are interpolated as for BD-rates; dots are measurements.
             axes.plot(*zip(*line or points, strict=True), **_line(one))
             if not one.published:
                 axes.plot(*zip(*points, strict=True), **_dots(one))
@@ -103,7 +103,7 @@ def _label(one: Results, pictures: int) -> str:
 
 
 def _slope(line: Curve) -> float:
-    """Gain in dB with the natural logarithm of the rate, at the end of a curve."""
+    """Slope at the end of a curve, in dB per unit of the natural logarithm of the rate."""
     if len(line) < 20:
         return 0.0
     (r0, q0), (r1, q1) = line[-20], line[-1]
@@ -113,7 +113,7 @@ def _slope(line: Curve) -> float:
 def _name_curves(
     axes: Axes, ends: Sequence[tuple[Results, tuple[float, float], float]], most: float
 ) -> None:
-    """Names right of the plot, at the height of the curves there, moved apart where needed."""
+    """Writes names right of the plot at the height of the curves, moved apart as far as needed."""
     if not ends:
         return
     bottom, top = axes.get_ylim()
@@ -124,7 +124,7 @@ def _name_curves(
     for i in order:
         height = min(max(heights[i], bottom), top)
         places.append(max(height, places[-1] + gap) if places else height)
-    # Pushed beyond the top, they move down again as far as they must.
+    # Names that were pushed beyond the top move down again, and those below them as well.
     for i in range(len(places) - 1, -1, -1):
         places[i] = min(places[i], top if i == len(places) - 1 else places[i + 1] - gap)
     pictures = max(len(one.rows) for one, _, _ in ends)

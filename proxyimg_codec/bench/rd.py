@@ -1,4 +1,4 @@
-"""Every picture by every codec at every quality, in processes of their own."""
+"""Measurement of every picture by every codec at every quality, in separate processes."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from .rows import Row
 Pixels = NDArray[np.uint8]
 
 SUFFIXES = (".png", ".webp", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".ppm", ".jp2", ".npy")
-"""Suffixes of files that are taken for pictures."""
+"""Suffixes of the files of a folder that are read as pictures."""
 
 ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS"), "1"
@@ -37,12 +37,12 @@ class Source:
     """A picture of the folder.
 
     Attributes:
-        path: Its file.
-        width: In pixels.
-        height: In pixels.
-        alpha: Some of it is transparent.
-        digest: Hash of its pixels.
-        masks: Its label map, or folder of masks; None if it has none.
+        path: File of the picture.
+        width: Width in pixels.
+        height: Height in pixels.
+        alpha: Whether some of it is transparent.
+        digest: Hash of shape and pixels.
+        masks: Label map, or folder of masks; None if there is none.
     """
 
     path: Path
@@ -55,7 +55,7 @@ class Source:
 
 @dataclass(frozen=True)
 class Task:
-    """One encode and decode."""
+    """One measurement to make: a picture, encoded and decoded by a codec at a quality."""
 
     source: Source
     codec: Codec
@@ -65,22 +65,25 @@ class Task:
 
 @dataclass(frozen=True)
 class Failure:
-    """What went wrong with a task."""
+    """Result of a task that failed, with the message of the error."""
 
     message: str
 
 
 def find(folder: Path, chosen: str | None = None, masks: Path | None = None) -> list[Source]:
-    """The pictures of a folder by name.
+    """Finds the pictures of a folder, sorted by name.
 
     Args:
-        folder: Where to look; not in folders inside it.
-        chosen: How many from the first, or names without suffix between commas; None = all.
-        masks: Folder with a label map ``NAME.png`` or a folder of masks ``NAME`` for some.
+        folder: Folder of the pictures; folders inside it are not searched.
+        chosen: Number of pictures to take from the first on, or their names without suffix,
+            separated by commas; None = all.
+        masks: Folder that has, for some pictures, a label map ``NAME.png`` or a folder of masks
+            ``NAME``.
 
     Raises:
-        InputError: No folder, no pictures, or a damaged one.
-        UsageError: A chosen picture is not there.
+        InputError: A folder does not exist, has no pictures or two of the same name, or a picture
+            is damaged.
+        UsageError: A chosen picture does not exist.
     """
     for place in (folder, masks):
         if place is not None and not place.is_dir():
@@ -115,7 +118,7 @@ def _source(path: Path, masks: Path | None) -> Source:
 
 
 def load(path: Path) -> Pixels:
-    """uint8 [H, W, 3] RGB, or [H, W, 4] where something is transparent; grey becomes RGB."""
+    """Reads a picture as uint8 RGB [H, W, 3], or with straight alpha [H, W, 4] if not opaque."""
     pixels = raster.read(path).pixels
     if pixels.dtype.kind == "f":
         pixels = np.rint(np.clip(pixels, 0, 1) * 255).astype(np.uint8)
@@ -131,7 +134,7 @@ def load(path: Path) -> Pixels:
 
 
 def plan(sources: Sequence[Source], codecs: Iterable[Codec]) -> list[Task]:
-    """What there is to do: a codec without alpha leaves out pictures with it, and so on."""
+    """Lists all tasks, without those where a codec lacks alpha, or a picture the masks it needs."""
     table = [(codec, codec.version()) for codec in codecs]
     return [
         Task(source, codec, version, quality)
@@ -143,9 +146,14 @@ def plan(sources: Sequence[Source], codecs: Iterable[Codec]) -> list[Task]:
 
 
 def run(tasks: Sequence[Task], jobs: int, finished: Callable[[Row | Failure], None]) -> None:
-    """Does the tasks in `jobs` processes of one thread each, in any order.
+    """Runs the tasks in processes of one thread each, in any order.
 
-    Stops at once if `finished` raises or the user interrupts.
+    If `finished` raises or the user interrupts, all processes are stopped at once.
+
+    Args:
+        tasks: The tasks.
+        jobs: Number of processes.
+        finished: Called with each result.
 
     Raises:
         LimitError: A process was killed, most likely for want of memory.
@@ -172,7 +180,7 @@ def run(tasks: Sequence[Task], jobs: int, finished: Callable[[Row | Failure], No
 
 
 def _start() -> None:
-    """A worker leaves interrupts to the main process, and OpenCV on one thread."""
+    """Prepares a worker: Ctrl-C is left to the main process, and OpenCV uses one thread."""
     import signal
 
     import cv2
@@ -182,7 +190,7 @@ def _start() -> None:
 
 
 def measure(task: Task) -> Row | Failure:
-    """Encodes and decodes; CPU seconds are those of the calls alone."""
+    """Runs a task; errors become a `Failure`. CPU seconds are those of the two calls alone."""
     source, codec = task.source, task.codec
     where = f"{source.path.name} by {codec.name} at quality {task.quality:g}"
     try:
@@ -190,7 +198,7 @@ def measure(task: Task) -> Row | Failure:
     except PxiError as error:
         return Failure(f"{where}: {error}")
     except Exception as error:
-        # Foreign codecs raise whatever they like; the other measurements should not be lost.
+        # Foreign codecs raise errors of any class; the other measurements must not be lost.
         return Failure(f"{where}: {type(error).__name__}: {error}")
 
 
@@ -226,7 +234,7 @@ _warmed: set[str] = set()
 
 
 def _warm(codec: Codec) -> None:
-    """Imports and tables of a codec are loaded before its first call is timed."""
+    """Runs a codec once before its first timed call, so that its imports and tables are loaded."""
     if codec.name not in _warmed:
         _warmed.add(codec.name)
         y, x = np.mgrid[0:32, 0:32].astype(np.uint8)
@@ -236,7 +244,7 @@ def _warm(codec: Codec) -> None:
 
 @lru_cache(maxsize=1)
 def machine() -> str:
-    """Processor and cores."""
+    """Name of the processor, and number of cores."""
     model = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
     if info.exists():

@@ -1,4 +1,4 @@
-"""What a run of `pxi-bench rd` writes and prints."""
+"""Output of a run of `pxi-bench rd`: tables, plots and the log of measurements."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def header(
     chosen: Sequence[Codec],
     jobs: int,
 ) -> str:
-    """Command, versions of all that takes part, pictures and machine."""
+    """Text with the command, all versions, the number of pictures, and the machine."""
     libraries = ", ".join(f"{n} {version(n)}" for n in ("numpy", "torch"))
     lines = [
         f"$ {command}",
@@ -45,18 +45,18 @@ def header(
 
 
 def is_kodak(sources: Sequence[Source]) -> bool:
-    """The pictures are kodim01 to kodim24."""
+    """Whether the pictures are called kodim01 to kodim24."""
     return [s.path.stem for s in sources] == [f"kodim{i:02d}" for i in range(1, 25)]
 
 
 class Log:
-    """The measurements of a run, in a file from the moment they are made.
+    """Log of the measurements of a run; each is written to a file as soon as it is made.
 
     Attributes:
         path: The CSV file.
-        rows: What is measured, or still holds from an earlier run.
-        failures: What went wrong.
-        open_tasks: What was not known at the start.
+        rows: Measurements of this run, and those of an earlier run that are still valid.
+        failures: Tasks that failed.
+        open_tasks: Tasks without a valid measurement at the start.
     """
 
     def __init__(self, path: Path, tasks: Sequence[Task], old: Sequence[Row]) -> None:
@@ -73,7 +73,7 @@ class Log:
         self._file = path.open("a", encoding="utf-8")
 
     def add(self, result: Row | Failure) -> None:
-        """Takes what came of one task."""
+        """Adds the result of one task."""
         if isinstance(result, Failure):
             self.failures.append(result)
             return
@@ -83,17 +83,17 @@ class Log:
 
     @property
     def complete(self) -> bool:
-        """Every task has come to an end."""
+        """Whether every task has a result."""
         return len(self.rows) + len(self.failures) == self._total
 
     def close(self) -> None:
-        """Leaves the file in the order of pictures, codecs and qualities."""
+        """Closes the file, and sorts it by picture, codec and quality."""
         self._file.close()
         self.rows.sort(key=lambda r: (r.picture, r.codec, r.quality))
         write_atomically(self.path, to_csv(self.rows).encode())
 
     def reuse_note(self, name: str) -> str:
-        """How much of an older file still holds, and what of it was measured elsewhere."""
+        """Text on the measurements reused from an older file, and on machines other than this."""
         reused = len(self.rows)
         text = f"{reused} measurements reused from {name}"
         if self._given > reused:
@@ -106,7 +106,7 @@ class Log:
 
 
 def task_key(task: Task) -> tuple[object, ...]:
-    """As `Row.key`, of what is still to be measured."""
+    """Key of a task, equal to `Row.key` of its measurement."""
     codec = task.codec
     return task.source.digest, codec.name, codec.settings, task.version, task.quality
 
@@ -121,8 +121,16 @@ def write(
 ) -> str:
     """Writes tables and plots to a folder.
 
+    Args:
+        out: The folder.
+        rows: All measurements.
+        codecs: The codecs in the order of the tables.
+        folder: Name of the picture folder, for titles.
+        rates: Least and greatest rate, in bits per pixel, for BD-rates.
+        published: Whether to add the published curves.
+
     Returns:
-        The tables.
+        The tables as Markdown.
     """
     results = summary.collect(rows, codecs)
     curves = [r.average("PSNR") for r in results]
@@ -133,7 +141,7 @@ def write(
     write_atomically(out / "summary.md", text.encode())
     count = len({row.picture for row in rows})
     title = f"{folder}: mean of {count} pictures" if count > 1 else f"{folder}: one picture"
-    # Small pictures need more bits a pixel: most of the curves should be seen.
+    # Small pictures need more bits per pixel; then the plot is wider, to show most of the curves.
     ends = [curve[-1][0] for curve in curves if curve]
     usual = statistics.median(ends) if ends else 0.0
     for metric, name in (("PSNR", "psnr"), ("MS-SSIM", "msssim")):

@@ -1,4 +1,4 @@
-"""Measurements as rows of a CSV file, and which of an older file still hold."""
+"""Measurements as rows of a CSV file, with a key to recognize them in a later run."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from ..io.files import read_bytes
 
 @dataclass(frozen=True)
 class Row:
-    """One picture by one codec at one quality.
+    """Measurement of one picture by one codec at one quality.
 
     Attributes:
-        picture: Name of the file without suffix.
-        digest: Hash of its pixels.
-        width: In pixels.
-        height: In pixels.
+        picture: Name of the picture file without suffix.
+        digest: Hash of shape and pixels.
+        width: Width in pixels.
+        height: Height in pixels.
         codec: Name of the codec.
-        settings: What is fixed in it.
-        version: Of its libraries.
-        machine: Where it ran.
-        quality: In the codec's own measure.
+        settings: Description of its fixed settings.
+        version: Versions of its libraries.
+        machine: Machine that it ran on.
+        quality: Quality in the codec's own measure.
         bytes: Size of the whole file.
-        bpp: Its bits a pixel.
-        psnr: In dB, see `measure.psnr`.
-        ms_ssim: 0..1, see `measure.ms_ssim`.
+        bpp: Size in bits per pixel.
+        psnr: PSNR in dB; see `measure.psnr`.
+        ms_ssim: MS-SSIM, 0..1; see `measure.ms_ssim`.
         encode_s: CPU seconds of encoding, all threads together.
         decode_s: CPU seconds of decoding.
     """
@@ -53,7 +53,7 @@ class Row:
 
     @property
     def key(self) -> tuple[Any, ...]:
-        """What has to agree for a measurement to be that of the same thing."""
+        """Key that is equal for measurements of the same picture, codec, version and quality."""
         return self.digest, self.codec, self.settings, self.version, self.quality
 
 
@@ -62,7 +62,7 @@ _TYPES = {"int": int, "float": float, "str": str}
 
 
 def to_csv(rows: Iterable[Row], head: bool = True) -> str:
-    """Rows as CSV text."""
+    """Rows as CSV text, with a line of column names if `head`."""
     out = io.StringIO()
     writer = csv.DictWriter(out, HEAD, lineterminator="\n")
     if head:
@@ -73,10 +73,10 @@ def to_csv(rows: Iterable[Row], head: bool = True) -> str:
 
 
 def read_csv(path: str | os.PathLike[str]) -> list[Row]:
-    """The rows of a file that `to_csv` wrote; a last line that was cut short is left out.
+    """Reads the rows of a file that `to_csv` wrote; an unfinished last line is ignored.
 
     Raises:
-        InputError: It cannot be read, or is something else.
+        InputError: The file cannot be read, is damaged, or is another kind of file.
     """
     text = read_bytes(path).decode("utf-8", "replace")
     whole = text[: text.rfind("\n") + 1]

@@ -1,4 +1,4 @@
-"""From rows to curves, BD-rates and tables."""
+"""Curves, BD-rates and tables from rows of measurements."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from .rows import Row
 Curve = list[tuple[float, float]]
 
 RATES = (0.2, 0.4, 0.64, 1.0)
-"""Bits a pixel at which quality is told."""
+"""Rates in bits per pixel at which tables state the quality."""
 
 ANCHORS = ("jpeg", "webp", "avif420", "avif444", "avif420-s0")
-"""Codecs that the printed tables compare with, where they ran."""
+"""Codecs that the printed tables compare with, as far as they took part."""
 
 METRICS: dict[str, Callable[[Row], float]] = {
     "PSNR": lambda row: row.psnr,
@@ -29,7 +29,7 @@ METRICS: dict[str, Callable[[Row], float]] = {
 }
 
 TO_DB: dict[str, Callable[[float], float]] = {"PSNR": lambda value: value, "MS-SSIM": decibel}
-"""MS-SSIM is averaged as it is, and interpolated and drawn in dB."""
+"""Conversion of each metric to dB. MS-SSIM is averaged as it is, but interpolated in dB."""
 
 
 @dataclass(frozen=True)
@@ -37,10 +37,10 @@ class Results:
     """All measurements of one codec, or its published curve.
 
     Attributes:
-        name: Of the codec.
-        label: For plots.
-        rows: The measurements by picture; empty if published.
-        published: Curves of the average by metric, MS-SSIM as it is; empty if measured.
+        name: Name of the codec.
+        label: Name in plots.
+        rows: Measurements by picture; empty if published.
+        published: Curves of the average by metric, MS-SSIM not in dB; empty if measured.
     """
 
     name: str
@@ -49,12 +49,17 @@ class Results:
     published: Mapping[str, Curve]
 
     def curve(self, metric: str, picture: str) -> Curve:
-        """Rate and quality in dB of one picture."""
+        """Points (rate in bits per pixel, quality in dB) of one picture."""
         value, scale = METRICS[metric], TO_DB[metric]
         return [(row.bpp, scale(value(row))) for row in self.rows[picture]]
 
     def average(self, metric: str, pictures: Sequence[str] | None = None) -> Curve:
-        """Rate and quality in dB, averaged over pictures at each quality that all of them have."""
+        """Points (rate, quality in dB) averaged over pictures, at settings that all of them have.
+
+        Args:
+            metric: ``PSNR`` or ``MS-SSIM``.
+            pictures: Names of the pictures; None = all.
+        """
         scale = TO_DB[metric]
         if self.published:
             return [(rate, scale(value)) for rate, value in self.published.get(metric, [])]
@@ -73,13 +78,13 @@ class Results:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Bits of one codec more than those of an anchor at equal quality, in per cent.
+    """BD-rates of one codec against an anchor, in per cent.
 
     Attributes:
-        mean: BD-rate of each picture, averaged; NaN if no picture has one.
+        mean: Mean of the BD-rates of the pictures; NaN if no picture has one.
         curve: BD-rate of the averaged curves; NaN if there is none.
-        better: Pictures with fewer bits than the anchor.
-        pictures: Pictures that have a BD-rate.
+        better: Number of pictures with fewer bits than the anchor.
+        pictures: Number of pictures that have a BD-rate.
     """
 
     mean: float
@@ -89,7 +94,7 @@ class Comparison:
 
 
 def collect(rows: Sequence[Row], codecs: Sequence[Codec]) -> list[Results]:
-    """The measurements by codec, in the order of the codecs; those without any are left out."""
+    """Groups measurements by codec, in the order of the codecs, without those that have none."""
     out = []
     for codec in codecs:
         by_picture: dict[str, list[Row]] = {}
@@ -102,7 +107,7 @@ def collect(rows: Sequence[Row], codecs: Sequence[Codec]) -> list[Results]:
 
 
 def published() -> list[Results]:
-    """Published curves of the 24 Kodak pictures; their sources stand in ``published.json``."""
+    """Reads published curves of the 24 Kodak pictures; ``published.json`` names their sources."""
     entries = json.loads(Path(__file__).with_name("published.json").read_text("utf-8"))
     keys = {"PSNR": "psnr", "MS-SSIM": "ms_ssim"}
     return [
@@ -113,7 +118,7 @@ def published() -> list[Results]:
 
 
 def compare(one: Results, anchor: Results, metric: str, rates: tuple[float, float]) -> Comparison:
-    """BD-rates over the pictures that both codecs have, at rates within `rates`."""
+    """Compares two codecs on the pictures that both have, at rates in bpp within `rates`."""
     common = [name for name in anchor.rows if one.published or name in one.rows]
     each = [
         bd_rate(one.curve(metric, n), anchor.curve(metric, n), rates)
@@ -138,7 +143,7 @@ def seconds(results: Results) -> tuple[float, float]:
 
 
 def to_csv(results: Sequence[Results], rates: tuple[float, float]) -> str:
-    """Every figure as one line: codec, measure, against, value, pictures."""
+    """All figures as CSV text, one per line: codec, measure, against, value, pictures."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(["codec", "measure", "against", "value", "pictures"])
@@ -167,7 +172,7 @@ def to_csv(results: Sequence[Results], rates: tuple[float, float]) -> str:
 
 
 def tables(results: Sequence[Results], rates: tuple[float, float]) -> str:
-    """The tables for people, as Markdown."""
+    """Tables for people, as Markdown."""
     parts = ["Quality at a rate, and median CPU seconds a picture", _quality_table(results)]
     anchors = [r for name in ANCHORS for r in results if r.name == name]
     anchors = anchors or [r for r in results if not r.published][:1]
@@ -218,7 +223,7 @@ def _name(one: Results) -> str:
 
 
 def _number(value: float, form: str) -> str:
-    """A number, or nothing for NaN; brackets of the form stand around it."""
+    """Formats a number by `form`, which may be in brackets; NaN gives an empty string."""
     if math.isnan(value):
         return ""
     return f"({value:{form[1:-1]}})" if form[0] == "(" else f"{value:{form}}"

@@ -1,1 +1,1 @@
-"""Between bytes and the model: packing, reading, writing, salvaging, levels."""
+"""Conversion between bytes and the model: packing, reading, writing, salvaging, levels."""

@@ -1,4 +1,4 @@
-"""What a decoder must be able to do to read a file: its profile, and its level."""
+"""Profile and level of a file: the features and the resources that a decoder needs to read it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..model import Picture
 from .unpack import unpack
 
 PROFILES = ("still", "posed", "moving")
-"""Each has what those before it have, and: nothing; poses and node sampling; motion."""
+"""Profiles. ``posed`` adds poses and node sampling to ``still``; ``moving`` adds motion to that."""
 
 LEVELS = (
     Limits(
@@ -30,18 +30,20 @@ LEVELS = (
     ),
     DEFAULT_LIMITS,
 )  # fmt: skip
-"""Level 1 is for thumbnails and pages, level 2 for photographs, level 3 is what readers accept."""
+"""Limits of the levels: 1 suits thumbnails and web pages, 2 photographs, 3 is the default."""
 
 DRAWING = ("overlap", "beyond", "output_pixels", "multiply_adds", "work")
+"""Limits on rendering."""
+
 COUNTED = tuple(f.name for f in fields(Limits) if f.name not in DRAWING)
-"""Limits that make a level: all but those of what is drawn."""
+"""Limits that define a level: all but those on rendering."""
 
 
 class Usage(Budget):
-    """A budget that remembers what was checked against its limits.
+    """Budget that also records the largest value checked against each limit.
 
     Attributes:
-        counted: The largest count of each limit, by its name.
+        counted: Largest value so far, by the name of the limit.
     """
 
     def __init__(self, limits: Limits) -> None:
@@ -49,13 +51,13 @@ class Usage(Budget):
         self.counted: dict[str, int] = {}
 
     def check(self, name: str, value: int) -> None:
-        """As `Budget.check`."""
+        """Checks like `Budget.check`, and records the value."""
         super().check(name, value)
         self.counted[name] = max(self.counted.get(name, 0), value)
 
     @property
     def level(self) -> int | None:
-        """The lowest level, 1..3, whose limits nothing exceeded; None if there is none."""
+        """Lowest level, 1..3, whose limits nothing has exceeded; None if there is none."""
         counted = {name: count for name, count in self.counted.items() if name in COUNTED}
         levels = (
             number
@@ -66,16 +68,19 @@ class Usage(Budget):
 
 
 def profile_and_level(data: bytes, limits: Limits = DEFAULT_LIMITS) -> tuple[str, int | None]:
-    """The lowest profile and level, 1..3, that a file needs; None if it is above all levels.
+    """Finds the lowest profile and level that a decoder needs for a file.
 
     Args:
-        data: The file.
-        limits: Bounds what is spent on it.
+        data: Bytes of the file.
+        limits: Bounds on what decoding the file may cost.
+
+    Returns:
+        One of `PROFILES`, and the level 1..3, or None if the file is above all levels.
 
     Raises:
         FormatError: The file breaks the format.
-        UnsupportedError: It needs a newer reader.
-        LimitError: It exceeds `limits`.
+        UnsupportedError: The file needs a newer reader.
+        LimitError: The file exceeds `limits`.
     """
     usage = Usage(limits)
     content = parse_within(data, usage)
@@ -84,7 +89,7 @@ def profile_and_level(data: bytes, limits: Limits = DEFAULT_LIMITS) -> tuple[str
 
 
 def refined(c: Container, usage: Usage) -> Picture:
-    """The picture of a parsed file, with its meshes, so that all that makes its level is counted.
+    """Decodes a parsed file together with its meshes, so that `usage` counts all costs of a level.
 
     Raises:
         FormatError, UnsupportedError, LimitError: As `profile_and_level`.
@@ -97,6 +102,6 @@ def refined(c: Container, usage: Usage) -> Picture:
 
 
 def profile(c: Container) -> str:
-    """The lowest of `PROFILES` that shows all of a file."""
+    """Lowest of `PROFILES` that shows everything in a file."""
     posed = bool(c.poses) or any(v["sampling"] for v in c.layers)
     return PROFILES[2 if c.motion is not None else 1 if posed else 0]

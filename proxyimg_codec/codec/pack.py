@@ -1,4 +1,4 @@
-"""From a picture to the fields of its chunks; `unpack` goes the other way."""
+"""Conversion of a picture to the fields of its chunks; the inverse is `unpack`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ..texture.planes import Planes
 
 
 def pack(picture: Picture) -> Container:
-    """The fields of all chunks of a picture."""
+    """Packs a picture to the fields of all its chunks."""
     meshes = [(i, v.mesh) for i, v in enumerate(picture.layers) if v.mesh is not None]
     posed = [(i, v) for i, v in enumerate(picture.layers) if not v.pose.at_rest]
     return Container(
@@ -53,7 +53,7 @@ def pack(picture: Picture) -> Container:
 
 
 def _textures(picture: Picture) -> tuple[Mapping[str, Any], ...]:
-    """Fields of each TEXR; what is equal to an earlier one refers to it."""
+    """Fields of each TEXR; a texture equal to an earlier one becomes a reference to that."""
     first: dict[Hashable, int] = {}
     numbers = {p: k for k, p in enumerate(picture.planes)}
     out: list[Mapping[str, Any]] = []
@@ -70,7 +70,7 @@ def _textures(picture: Picture) -> tuple[Mapping[str, Any], ...]:
 def _texture(
     picture: Picture, number: int, planes: Mapping[Planes, int]
 ) -> tuple[Mapping[str, Any], Hashable]:
-    """Fields of a layer's TEXR, and what else they depend on for their meaning."""
+    """Fields of the TEXR of a layer, and a key for what else decides their meaning."""
     shown = picture.layers[number].texture
     if isinstance(shown, ImplicitTexture):
         return shown.packed, None

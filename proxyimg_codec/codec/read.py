@@ -1,4 +1,4 @@
-"""From the bytes of a file to the picture."""
+"""Decoding of a file to a picture."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ def from_bytes(data: bytes, limits: Limits = DEFAULT_LIMITS, *, tolerant: bool =
     """Decodes a `.pxi` file held in memory.
 
     Args:
-        data: The file.
-        limits: Bounds what is spent on it.
-        tolerant: Whether to make do with what can be decoded of a file that is cut off or damaged.
-            What is wrong is logged as a warning, and stands in `Picture.damage`.
+        data: Bytes of the file.
+        limits: Bounds on what decoding the file may cost.
+        tolerant: Whether to decode as much as possible of a truncated or damaged file. The damage
+            is logged as a warning, and described in `Picture.damage`.
 
     Raises:
         FormatError: The file breaks the format; or, if `tolerant`, too little of it is left.
-        UnsupportedError: It needs a newer reader.
-        LimitError: It exceeds `limits`.
+        UnsupportedError: The file needs a newer reader.
+        LimitError: The file exceeds `limits`.
     """
     damage: tuple[str, ...] = ()
     try:
@@ -51,7 +51,12 @@ def from_bytes(data: bytes, limits: Limits = DEFAULT_LIMITS, *, tolerant: bool =
 def from_file(
     path: str | os.PathLike[str], limits: Limits = DEFAULT_LIMITS, *, tolerant: bool = False
 ) -> Picture:
-    """Decodes a `.pxi` file; see `from_bytes`.
+    """Reads and decodes a `.pxi` file.
+
+    Args:
+        path: Path of the file; ``-`` is standard input.
+        limits: Bounds on what decoding the file may cost.
+        tolerant: As for `from_bytes`.
 
     Raises:
         InputError: The file cannot be read.
@@ -66,17 +71,20 @@ def from_file(
 
 
 def from_own_bytes(data: bytes) -> Picture:
-    """The picture that `write.serialized` gave, which may be of any size.
+    """Decodes bytes that `write.serialized` made, without any limits.
 
     Raises:
-        FormatError: The bytes are not those.
+        FormatError: The bytes are not such a file.
     """
     budget = Budget(Limits(**{f.name: 1 << 62 for f in fields(Limits)}))
     return unpack(parse_within(data, budget), budget)
 
 
 def from_state(chunks: Sequence[Chunk]) -> Picture:
-    """The picture of a state that a history holds: all chunks of its file but uNDO and TAIL.
+    """Decodes a state of a history, within the default limits.
+
+    Args:
+        chunks: All chunks of the state but uNDO and TAIL.
 
     Raises:
         FormatError, UnsupportedError, LimitError: As `from_bytes`.

@@ -1,7 +1,7 @@
-"""Files that are cut off or damaged, read as far as they go.
+"""Reading of truncated or damaged files, as far as possible.
 
-The planes of pyramid textures come before what shows them, coarsest level first: of a file that did
-not arrive as a whole there is a blurred picture.
+The planes of pyramid textures stand before the textures that show them, coarsest level first. So a
+file of which only the beginning has arrived gives a blurred picture.
 """
 
 from __future__ import annotations
@@ -25,15 +25,22 @@ _END = Chunk("TAIL", b"")
 
 
 def parse(data: bytes, limits: Limits) -> tuple[Container, tuple[str, ...]]:
-    """What can be used of a file, and what is wrong with it.
+    """Reads the usable parts of a file that may be truncated or damaged.
 
-    Levels of planes that cannot be decoded are 0. Without the textures of its layers, the picture
-    is the first raster as it is.
+    Levels of planes that cannot be decoded become 0. If textures of layers are missing, the picture
+    becomes one layer that shows the first raster. The history of a damaged file is dropped.
+
+    Args:
+        data: Bytes of the file.
+        limits: Bounds on what decoding the file may cost.
+
+    Returns:
+        The content, and descriptions of the damage; none for a file that is whole.
 
     Raises:
-        FormatError: Too little of it is left.
-        UnsupportedError: It needs a newer reader.
-        LimitError: It exceeds `limits`.
+        FormatError: Too little of the file is left.
+        UnsupportedError: The file needs a newer reader.
+        LimitError: The file exceeds `limits`.
     """
     notes: list[str] = []
     wrong: dict[int, bool] = {}
@@ -62,10 +69,19 @@ def parse(data: bytes, limits: Limits) -> tuple[Container, tuple[str, ...]]:
 def _usable(
     chunks: Sequence[Chunk], wrong: dict[int, bool], notes: list[str]
 ) -> tuple[list[Chunk], dict[int, bool]]:
-    """Chunks that make a file together, but TAIL, and which PLAN among them are not right.
+    """Selects chunks that make a valid file together.
+
+    Args:
+        chunks: The chunks of the damaged file.
+        wrong: Bad chunks by index: True if truncated, False if the CRC is wrong.
+        notes: List to which descriptions of the damage are added.
+
+    Returns:
+        The chunks of the file without TAIL, and the bad PLAN chunks among them: by the number of
+        the PLAN, True if it is truncated.
 
     Raises:
-        FormatError: They make none.
+        FormatError: The chunks are not enough for a file.
     """
     kept: list[Chunk] = []
     doubtful: dict[int, bool] = {}
@@ -95,10 +111,10 @@ def _usable(
 
 
 def _closed(payload: bytes, where: str) -> bytes:
-    """A payload whose last value, bytes, ends where the payload does.
+    """Shortens the last value of a truncated payload, bytes, to the bytes that are there.
 
     Raises:
-        FormatError: It does not reach as far.
+        FormatError: The payload ends before its last value.
     """
     reader = msgpack.Unpacker(max_buffer_size=0)
     reader.feed(payload)
@@ -115,10 +131,11 @@ def _closed(payload: bytes, where: str) -> bytes:
 
 
 def _one_layer(chunks: Sequence[Chunk]) -> list[Chunk]:
-    """HEAD, LAYR, PLAN and TEXR of a picture that shows the first raster on all of the canvas.
+    """Makes HEAD, LAYR, PLAN and TEXR of a picture that shows the first raster on the whole canvas.
 
     Raises:
-        FormatError: There is none, or it does not have the size of an opaque canvas.
+        FormatError: There is no raster, it has another size than the canvas, or the picture is not
+            opaque.
     """
     header = container.values(chunks[0])
     found = {c.type: c for c in reversed(chunks)}

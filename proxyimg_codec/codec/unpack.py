@@ -1,4 +1,4 @@
-"""From the fields of a file's chunks to the picture; `pack` goes the other way."""
+"""Conversion of the fields of chunks to a picture; the inverse is `pack`."""
 
 from __future__ import annotations
 
@@ -26,12 +26,17 @@ from .write import PADDING
 
 
 def unpack(c: Container, budget: Budget, damage: tuple[str, ...] = ()) -> Picture:
-    """The picture of a parsed file.
+    """Unpacks the picture of a parsed file.
+
+    Args:
+        c: The parsed and checked file.
+        budget: Running budget of the file, which meshes go on to spend when they are decoded.
+        damage: Descriptions of the damage that was tolerated.
 
     Raises:
         FormatError: The file breaks the format.
-        UnsupportedError: It needs a newer reader.
-        LimitError: It exceeds `budget`.
+        UnsupportedError: The file needs a newer reader.
+        LimitError: The file exceeds `budget`.
     """
     networks = tuple(network.unpack(v, f"chunk NETW {i}") for i, v in enumerate(c.networks))
     meshes = {
@@ -63,7 +68,7 @@ def unpack(c: Container, budget: Budget, damage: tuple[str, ...] = ()) -> Pictur
 
 
 def _parents(c: Container) -> tuple[list[str | None], dict[str, str | None]]:
-    """The parent of each layer, and of each group by its name."""
+    """Parents of all layers, in their order, and of all groups, by name."""
     if c.tree is None:
         return [None] * len(c.layers), {}
     groups = c.tree["groups"]
@@ -76,7 +81,7 @@ def _parents(c: Container) -> tuple[list[str | None], dict[str, str | None]]:
 def _textures(
     c: Container, networks: tuple[Network, ...], outlines: list[Boundary | None]
 ) -> list[Texture]:
-    """The texture of each layer; layers that share one have the same object."""
+    """Textures of all layers; layers that share a texture get the same object."""
     sources = [planes.unpack(v, f"chunk PLAN {i}") for i, v in enumerate(c.planes)]
     textures: list[Texture] = []
     for i, (layer, v) in enumerate(zip(c.layers, c.textures, strict=True)):
@@ -99,11 +104,19 @@ def _box(layer: Mapping[str, Any]) -> tuple[int, int, int, int]:
 def motion(
     fields: Mapping[str, Any] | None, meshes: Mapping[int, Mesh], budget: Budget
 ) -> tuple[Timeline | None, dict[int, Track]]:
-    """The timeline of mOTN, and the track of each layer that moves, by its number.
+    """Decodes the motion of a picture.
+
+    Args:
+        fields: Values of mOTN; None if there is no such chunk.
+        meshes: Meshes by the number of their layer.
+        budget: Running budget of the file.
+
+    Returns:
+        The timeline, or None, and the tracks of the layers that move, by the number of the layer.
 
     Raises:
         FormatError: The chunk is corrupt.
-        LimitError: It exceeds `budget`.
+        LimitError: The motion exceeds `budget`.
     """
     if fields is None:
         return None, {}

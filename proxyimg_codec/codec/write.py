@@ -1,4 +1,4 @@
-"""From a picture to the bytes of a file."""
+"""Encoding of a picture to the bytes of a file."""
 
 from __future__ import annotations
 
@@ -13,16 +13,20 @@ from ..model import Picture, Pictured
 from .pack import pack
 
 PADDING = "paDD"
-"""A chunk that lengthens a file too small for what it holds (SEC-3); readers drop it."""
+"""Type of a chunk that pads a file which is too small for the limits that it needs [SEC-3].
+
+Readers drop it.
+"""
 
 _CHUNKS: WeakKeyDictionary[Picture, tuple[Chunk, ...]] = WeakKeyDictionary()
 
 
 def to_bytes(image: Pictured) -> bytes:
-    """The `.pxi` file of a picture.
+    """Encodes a picture as a `.pxi` file.
 
     Raises:
-        LimitError: It is larger than readers accept by default.
+        FormatError: The picture breaks a rule between chunks.
+        LimitError: The file would exceed what readers accept by default.
     """
     content, budget = pack(image.picture), Budget()
     check(content, budget)
@@ -34,12 +38,12 @@ def to_bytes(image: Pictured) -> bytes:
 
 
 def serialized(image: Pictured) -> bytes:
-    """The file of a picture, also of one larger than readers accept: for `read.from_own_bytes`."""
+    """Encodes a picture of any size, even beyond the limits, for `read.from_own_bytes`."""
     return serialize(pack(image.picture))
 
 
 def state(image: Pictured) -> tuple[Chunk, ...]:
-    """The chunks of a picture's file but uNDO and TAIL: what an edit leads from, or back to."""
+    """Chunks of the file of a picture but uNDO and TAIL: a state as the history stores it."""
     picture = image.picture
     if picture not in _CHUNKS:
         _CHUNKS[picture] = tuple(present(pack(picture)))

@@ -1,4 +1,4 @@
-"""What chunks must agree on, and the budget that all of them share."""
+"""Checks across chunks: their agreement with each other, and the budget that they share."""
 
 from __future__ import annotations
 
@@ -11,12 +11,16 @@ from .content import Container, Values
 
 
 def check(c: Container, budget: Budget) -> None:
-    """Checks a parsed file.
+    """Checks that the chunks of a parsed file agree, and spends what they will cost to decode.
+
+    Args:
+        c: The parsed file.
+        budget: The running budget of this file.
 
     Raises:
-        FormatError: They contradict each other.
-        UnsupportedError: They need a newer reader.
-        LimitError: They exceed `budget`.
+        FormatError: Two chunks contradict each other, or a chunk breaks a rule.
+        UnsupportedError: A chunk needs a newer reader.
+        LimitError: The chunks exceed `budget`.
     """
     for name in ("layers", "networks"):
         budget.check(name, c.head[name])
@@ -49,12 +53,12 @@ def check(c: Container, budget: Budget) -> None:
 
 
 def decompressed(c: Container) -> int:
-    """Bytes of the metadata and the script."""
+    """Size in bytes of the metadata blocks and the motion script, decompressed."""
     return sum(map(len, c.blocks.values())) + (c.motion["size"] if c.motion else 0)
 
 
 def _check_motion(c: Container, budget: Budget) -> None:
-    """Checks mOTN."""
+    """Checks mOTN against the layers and meshes."""
     if c.motion is None:
         return
     numbers, meshed = c.motion["layers"], {values["layer"] for values in c.meshes}
@@ -73,7 +77,8 @@ def _check_motion(c: Container, budget: Budget) -> None:
         raise FormatError("the back layer of an opaque file moves", "chunk mOTN", rule="MOT-1")
     if bool(c.motion["size"]) != bool(c.motion["script"]):
         raise FormatError("the script and its size do not fit", "chunk mOTN", rule="MOT-1")
-    # It is spent once the meshes are decoded, with what nodes cost.
+    # Only a lower bound is checked here: what nodes cost is known, and all of it is spent, once the
+    # meshes are decoded.
     coefficients = len(numbers) * (c.motion["intervals"] + (0 if c.motion["loop"] else 3))
     budget.check("wavefronts", coefficients + 2)
     budget.check("motion", c.motion["modes"] * coefficients)
@@ -90,7 +95,7 @@ def _check_networks(c: Container, budget: Budget) -> None:
 
 
 def _check_planes(c: Container, budget: Budget) -> None:
-    """Checks PLAN, and that textures use all of them, in their order."""
+    """Checks that textures use every PLAN, in file order, and spends what decoding them costs."""
     for planes in c.planes:
         columns, rows = (-(-n >> planes["levels"]) << planes["levels"] for n in planes["size"])
         budget.spend("wavefronts", columns + 3 * rows)
@@ -140,7 +145,8 @@ def _check_textures(c: Container, budget: Budget) -> None:
             area = own["part"][2] * own["part"][3]
             if own["mask"] or own["cuts"]:
                 budget.spend("filled", area)
-            # A layer that cuts itself may also lose what those behind it touch.
+            # Where a layer is cut by its own boundary, the coverage of every layer behind it may
+            # be needed too [PYR-46].
             budget.spend("covered", area * (len(own["cuts"]) + (i if i in own["cuts"] else 0)))
             if not own["mask"]:
                 continue
@@ -151,7 +157,7 @@ def _check_textures(c: Container, budget: Budget) -> None:
 
 
 def _check_implicit(c: Container, layer: Values, texture: Values) -> int:
-    """Checks an implicit texture; its channels."""
+    """Checks an implicit texture, and returns its number of channels."""
     if texture["network"] >= len(c.networks):
         raise FormatError(
             f"network {texture['network']} does not exist", "chunk TEXR", rule="CHK-14"
@@ -165,7 +171,7 @@ def _check_implicit(c: Container, layer: Values, texture: Values) -> int:
 
 
 def _check_view(c: Container, layer: Values, texture: Values) -> int:
-    """Checks a pyramid texture, whose planes exist; its channels."""
+    """Checks a pyramid texture whose planes exist, and returns its number of channels."""
     if layer["sampling"]:
         raise FormatError("node sampling needs an implicit texture", "chunk LAYR", rule="CHK-7")
     columns, rows = c.planes[texture["planes"]]["size"]
@@ -187,7 +193,7 @@ def _check_view(c: Container, layer: Values, texture: Values) -> int:
 
 
 def _check_cuts(c: Container, number: int) -> None:
-    """Checks the cuts of the pyramid texture of layer `number`."""
+    """Checks `cuts` in the pyramid texture of layer `number`."""
     texture = c.textures[number]
     cuts = texture["cuts"]
     if not cuts:
@@ -205,7 +211,7 @@ def _check_cuts(c: Container, number: int) -> None:
 
 
 def _check_layers(c: Container) -> None:
-    """Checks what MESH, POSE and LAYR must agree on."""
+    """Checks LAYR against MESH and POSE, and the back layer against HEAD."""
     for type_, values, rule in (
         (mesh.TYPE, c.meshes, "CHK-9"), (pose.TYPE, c.poses, "CHK-10"),
     ):  # fmt: skip
@@ -247,7 +253,8 @@ def _check_tree(c: Container) -> None:
         raise FormatError(
             "the parents do not fit the layers and groups", "chunk tREE", rule="CHK-18"
         )
-    # Each walk upwards ends where another has been: the time is linear in the nodes.
+    # Each walk to the root ends at the first node that an earlier walk has visited, so the time is
+    # linear in the number of nodes.
     walked = [0] * (len(parents) + 1)
     for start in range(1, len(walked)):
         node = start

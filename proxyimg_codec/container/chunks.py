@@ -1,9 +1,10 @@
 """Chunk framing: signature, version, and a run of checked chunks without gaps.
 
-A chunk is type (4 ASCII letters), u32 length, payload, u32 CRC-32 over type, length and payload;
-integers are little-endian. As in PNG, letter case carries bits: first letter lower case = ancillary
-(a reader may ignore the chunk), second lower = private, third is upper, fourth lower = safe to copy
-into an edited file by a program that does not know the chunk.
+A chunk consists of its type (4 ASCII letters), a u32 length, the payload, and a u32 CRC-32 over
+type, length and payload. Integers are little-endian. As in PNG, the case of each letter of the type
+carries a bit: a lower-case first letter means ancillary (a reader may ignore the chunk), a
+lower-case second letter private, the third is always upper case, and a lower-case fourth letter
+means that a program that does not know the chunk may copy it into an edited file.
 """
 
 from __future__ import annotations
@@ -18,30 +19,33 @@ from ..limits import Budget
 
 SIGNATURE = b"\x89PXI\r\n\x1a\n"
 VERSION = (0, 9)
-"""What is written."""
+"""Version of the format, major and minor, that is written."""
 
 READABLE = ((0, 1), (0, 2), (0, 3), VERSION)
-"""What is read; what has changed between them is in chapter 16 of the specification."""
+"""Versions of the format that are read; chapter 16 of the specification says how they differ."""
 
 MAPS_UNTIL = (0, 3)
-"""Last version whose payloads may be maps, and whose histories are bound in another way."""
+"""Last version whose payloads may be maps, and whose history hash also covers a file prefix."""
 
 PREFIX = struct.Struct("<8sBBH")
-"""Signature, major version, minor version, reserved (0)."""
+"""File prefix: signature, major version, minor version, reserved (0)."""
 
 FRAME = struct.Struct("<4sI")
+"""Chunk header: type, length of the payload."""
+
 CHUNK_MAX = (1 << 31) - 1
+"""Most bytes of a payload."""
 
 
 @dataclass(frozen=True)
 class Chunk:
-    """A chunk.
+    """A typed piece of a file, without its CRC.
 
     Attributes:
-        type: Four letters.
-        payload: What it holds.
-        offset: Its place in the file it was read from.
-        version: Of the format of that file, which says how the payload is written.
+        type: Four ASCII letters.
+        payload: Content in bytes.
+        offset: Byte offset in the file it was read from; None if it was made in memory.
+        version: Format version, major and minor, that the payload is written in.
     """
 
     type: str
@@ -61,17 +65,17 @@ class Chunk:
 
     @property
     def old(self) -> bool:
-        """Whether it may hold what was given up with `MAPS_UNTIL`."""
+        """Whether the payload may be in the form that was given up after version `MAPS_UNTIL`."""
         return self.version <= MAPS_UNTIL
 
     @property
     def size(self) -> int:
-        """Bytes in the file, framing included."""
+        """Number of bytes in the file, framing included."""
         return FRAME.size + len(self.payload) + 4
 
 
 def write(chunks: Iterable[Chunk], version: tuple[int, int] = VERSION) -> bytes:
-    """The file made of `chunks`."""
+    """Returns the file that consists of `chunks`, in their order."""
     parts = [PREFIX.pack(SIGNATURE, *version, 0)]
     for chunk in chunks:
         body = FRAME.pack(chunk.type.encode("ascii"), len(chunk.payload)) + chunk.payload
@@ -80,7 +84,7 @@ def write(chunks: Iterable[Chunk], version: tuple[int, int] = VERSION) -> bytes:
 
 
 def _version(data: bytes) -> tuple[int, int]:
-    """The version that the prefix states, which is checked."""
+    """Checks the prefix of a file, and returns the format version that it states."""
     if not data:
         raise FormatError("the file is empty", rule="CON-2")
     if data[: len(SIGNATURE)] != SIGNATURE[: len(data)]:
@@ -104,12 +108,16 @@ def _valid_type(raw: bytes) -> bool:
 
 
 def read(data: bytes, budget: Budget | None = None) -> list[Chunk]:
-    """All chunks of a file, in order, each CRC checked.
+    """Reads all chunks of a file, in order, and checks the CRC of each.
+
+    Args:
+        data: The file.
+        budget: Running budget of this file; by default a new one with the default limits.
 
     Raises:
         FormatError: Wrong signature, truncation, bad CRC, bad type, or bytes after the last chunk.
-        UnsupportedError: Another format version.
-        LimitError: Too large or too many chunks.
+        UnsupportedError: The file has a format version that is not in `READABLE`.
+        LimitError: The file is too large, or has too many chunks.
     """
     budget = budget or Budget()
     budget.spend("file_bytes", len(data))
@@ -143,16 +151,20 @@ def read(data: bytes, budget: Budget | None = None) -> list[Chunk]:
 
 
 def read_damaged(data: bytes, budget: Budget | None = None) -> tuple[list[Chunk], dict[int, bool]]:
-    """The chunks of a file that may be cut off or damaged, as far as chunks can be told.
+    """Reads the chunks of a file that may be truncated or damaged, up to the first bad header.
+
+    Args:
+        data: The file.
+        budget: Running budget of this file; by default a new one with the default limits.
 
     Returns:
-        The chunks, and the places in this list of those that are not right, with whether one is
-        cut off. Otherwise it fails its CRC.
+        The chunks, and the bad ones among them: a map from an index in the list to True if that
+        chunk is truncated, or False if it is complete but fails its CRC.
 
     Raises:
-        FormatError: Not the beginning of a .pxi file.
-        UnsupportedError: Another format version.
-        LimitError: Too large or too many chunks.
+        FormatError: The data does not begin like a .pxi file.
+        UnsupportedError: The file has a format version that is not in `READABLE`.
+        LimitError: The file is too large, or has too many chunks.
     """
     budget = budget or Budget()
     budget.spend("file_bytes", len(data))

@@ -1,4 +1,4 @@
-"""The content of a parsed file: the checked values of its chunks, without numpy."""
+"""Content of a parsed file: the checked values of its chunks, without numpy."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from . import texr, undo
 from .chunks import Chunk
 
 Values = Mapping[str, Any]
-"""The values of one chunk, by the keys of its fields."""
+"""Values of one chunk, by the keys of its fields."""
 
 
 @dataclass(frozen=True)
@@ -21,17 +21,17 @@ class Container:
         head: Fields of HEAD.
         layers: Fields of each LAYR, back to front.
         networks: Fields of each NETW.
-        textures: Fields of each TEXR, one a layer.
+        textures: Fields of each TEXR, one per layer.
         planes: Fields of each PLAN.
         meshes: Fields of each MESH.
         poses: Fields of each POSE.
         tree: Fields of tREE, or None.
         motion: Fields of mOTN, or None.
-        history: Steps of uNDO that led to this state.
+        history: Steps of uNDO that led to this state, oldest first.
         blocks: Metadata blocks by name: ``icc``, ``exif``, ``xmp``.
         info: Fields of iNFO, or None.
         extra: Unknown ancillary chunks.
-        sizes: Bytes of all chunks of a type, framing included, by type.
+        sizes: Number of bytes of all chunks of a type together, framing included, by type.
     """
 
     head: Values
@@ -50,6 +50,6 @@ class Container:
     sizes: Mapping[str, int] = field(default_factory=dict)
 
     def texture_of(self, layer: int) -> Values:
-        """Fields of the texture that a layer shows: its own, or the one it shares."""
+        """Fields of the texture that layer number `layer` shows: its own, or the one it shares."""
         own = self.textures[layer]
         return self.textures[own["texture"]] if own["coder"] == texr.SHARED else own

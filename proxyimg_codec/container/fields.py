@@ -1,9 +1,9 @@
 """Declared fields of structured chunks, packed as one canonical msgpack array.
 
-Canonical: values in the declared order, shortest encodings, no floats, no extension types. A reader
-re-packs what it read and compares, so that every content has exactly one encoding. Files up to
-version 0.3 may hold maps from the keys to the values instead. The byte tables of the specification
-are printed from these declarations.
+Canonical means: values in the declared order, shortest encodings, no floats, no extension types. A
+reader packs again what it read and compares, so every content has exactly one encoding. Files up to
+version 0.3 may hold maps from keys to values instead. The byte tables of the specification are
+printed from these declarations.
 """
 
 from __future__ import annotations
@@ -17,20 +17,21 @@ import msgpack
 from ..errors import FormatError
 
 _TYPES = {"bin": "bytes", "ints": "list", "strs": "list"}
-"""Python types of the kinds that are not called as they are."""
+"""Names of the Python types of those kinds that are not named after their type."""
 
 
 @dataclass(frozen=True)
 class Field:
-    """One value of a chunk.
+    """Declaration of one value of a chunk.
 
     Attributes:
-        key: Its name, which maps of earlier versions hold.
+        key: Name of the value; maps of earlier versions hold it.
         kind: ``int``, ``str``, ``bin``, ``ints`` (an array of integers) or ``strs`` (of strings).
         meaning: One sentence for the specification.
-        low: Smallest integer, or smallest number of bytes or characters.
-        high: Largest, likewise.
-        items: Exact number of items of an ``ints`` field whose items lie in low..high; 0 = any.
+        low: Smallest integer, or smallest number of bytes (``bin``) or characters.
+        high: Largest integer, or largest number of bytes or characters.
+        items: Exact number of items of an ``ints`` field; 0 = any number. For ``ints`` and
+            ``strs``, `low` and `high` bound each item.
     """
 
     key: str
@@ -41,7 +42,7 @@ class Field:
     items: int = 0
 
     def problem(self, value: Any) -> str | None:
-        """Why `value` does not fit, or None."""
+        """Description of the way in which `value` breaks the declaration; None if it is valid."""
         if type(value).__name__ != _TYPES.get(self.kind, self.kind):
             return f"is not of type {self.kind}"
         if self.kind == "strs":
@@ -62,19 +63,19 @@ class Field:
 
 
 class Few:
-    """A hook of msgpack that refuses many arrays and maps, or many items: each takes much memory.
+    """Hook for msgpack that bounds the number of arrays, maps and items, which take much memory.
 
     Args:
-        containers: How many arrays and maps there may be.
-        items: How many items they may have together.
-        refusal: What is raised if there are more.
+        containers: Most arrays and maps together.
+        items: Most items of all of them together.
+        refusal: The exception that is raised if there are more.
     """
 
     def __init__(self, containers: int, items: int, refusal: Exception) -> None:
         self._containers, self._items, self._refusal = containers, items, refusal
 
     def __call__(self, found: Any) -> Any:
-        """Counts an array or map."""
+        """Counts an array or map, and returns it unchanged."""
         self._containers -= 1
         self._items -= len(found)
         if self._containers < 0 or self._items < 0:
@@ -83,7 +84,11 @@ class Few:
 
 
 def pack(fields: tuple[Field, ...], values: Mapping[str, Any]) -> bytes:
-    """Packs `values`, which must be valid, in declared order.
+    """Packs `values` in the declared order.
+
+    Args:
+        fields: The declarations.
+        values: A value for each field, by key.
 
     Raises:
         ValueError: A value does not fit its declaration.
@@ -99,10 +104,20 @@ def pack(fields: tuple[Field, ...], values: Mapping[str, Any]) -> bytes:
 def unpack(
     fields: tuple[Field, ...], payload: bytes, where: str, *, old: bool = False
 ) -> dict[str, Any]:
-    """The checked values of a payload, by key; those of `old` files may be a map.
+    """Unpacks and checks the values of a payload.
+
+    Args:
+        fields: The declarations.
+        payload: Payload of the chunk.
+        where: Name of the chunk in error messages.
+        old: Whether the payload may also be a map, as in files up to version 0.3.
+
+    Returns:
+        The values by key.
 
     Raises:
-        FormatError: Not msgpack, not canonical, a missing, unknown or out-of-range field.
+        FormatError: The payload is not msgpack or not canonical, or a field is missing, unknown or
+            out of range.
     """
     try:
         few = Few(1 + len(fields), 1 << 20, ValueError())

@@ -1,4 +1,4 @@
-"""The order of chunks: bytes <-> `Container`, without numpy."""
+"""Order of the chunks in a file: between bytes and `Container`, without numpy."""
 
 from __future__ import annotations
 
@@ -23,18 +23,22 @@ _FIELDS = {
 
 
 def parse(data: bytes, limits: Limits = DEFAULT_LIMITS) -> Container:
-    """Reads and checks a whole file, short of decoding its entropy-coded streams.
+    """Reads and checks a whole file, but does not decode its entropy-coded streams.
+
+    Args:
+        data: The file.
+        limits: Bounds on what the file may cost.
 
     Raises:
         FormatError: The file breaks the format.
-        UnsupportedError: It needs a newer reader.
-        LimitError: It exceeds `limits`.
+        UnsupportedError: The file needs a newer reader.
+        LimitError: The file exceeds `limits`.
     """
     return parse_within(data, Budget(limits))
 
 
 def parse_within(data: bytes, budget: Budget) -> Container:
-    """As `parse`, of a budget that decoding goes on to spend.
+    """Does the same as `parse`, but spends a running budget that decoding goes on to use.
 
     Raises:
         FormatError, UnsupportedError, LimitError: As `parse`.
@@ -45,12 +49,12 @@ def parse_within(data: bytes, budget: Budget) -> Container:
 def assemble(
     chunks: Sequence[Chunk], budget: Budget, values_of: Callable[[Chunk], Values] | None = None
 ) -> Container:
-    """The container of all chunks of a file.
+    """Checks all chunks of a file together, and returns them as a container.
 
     Args:
-        chunks: The last is TAIL.
-        budget: Bounds them all together.
-        values_of: Gives the values of a structured chunk; `values` by default.
+        chunks: All chunks in file order; the last one is TAIL.
+        budget: Running budget of the file.
+        values_of: Function from a structured chunk to its values; `values` by default.
 
     Raises:
         FormatError, UnsupportedError, LimitError: As `parse`.
@@ -71,7 +75,7 @@ def assemble(
 
 
 class _Parts:
-    """The chunks of a file sorted by what they are, in the order in which they come."""
+    """Collector that takes the chunks of a file in order and sorts them by type."""
 
     def __init__(
         self, chunks: Sequence[Chunk], budget: Budget, values_of: Callable[[Chunk], Values]
@@ -89,9 +93,9 @@ class _Parts:
         """Takes the next chunk after HEAD.
 
         Raises:
-            FormatError: It may not stand here, or is wrong in itself.
-            UnsupportedError: It is critical and not known.
-            LimitError: It exceeds the budget.
+            FormatError: The chunk may not stand in this place, or its content is wrong.
+            UnsupportedError: The chunk is critical, and its type is not known.
+            LimitError: The chunk exceeds the budget.
         """
         where = f"chunk {chunk.type}"
         if chunk.type in _STRUCTURE:
@@ -125,7 +129,7 @@ class _Parts:
             raise FormatError("appears twice", f"chunk {chunk.type}", chunk.offset, rule="CON-11")
 
     def container(self) -> Container:
-        """All that was taken."""
+        """Container of all chunks taken so far."""
         sizes: dict[str, int] = {}
         for chunk in self._chunks:
             sizes[chunk.type] = sizes.get(chunk.type, 0) + chunk.size
@@ -149,29 +153,30 @@ class _Parts:
 
 
 def fields_of(chunk: Chunk) -> tuple[Field, ...]:
-    """The declared fields of a chunk; none if it is not a structured one.
+    """Declared fields of a chunk; an empty tuple if the chunk is not a structured one.
 
     Raises:
-        UnsupportedError: A texture coder that is not known.
+        UnsupportedError: The texture coder is not known.
     """
     return texr.fields_of(chunk.payload) if chunk.type == texr.TYPE else _FIELDS.get(chunk.type, ())
 
 
 def values(chunk: Chunk) -> Values:
-    """The values of a structured chunk, each checked by itself.
+    """Unpacks the values of a structured chunk, and checks each by itself.
 
     Raises:
-        FormatError: They are not as declared.
-        UnsupportedError: A texture coder that is not known.
+        FormatError: A value is not as declared.
+        UnsupportedError: The texture coder is not known.
     """
     where = f"chunk {chunk.type}" + ("" if chunk.offset is None else f" at byte {chunk.offset}")
     return unpack(fields_of(chunk), chunk.payload, where, old=chunk.old)
 
 
 def _renewed(steps: tuple[undo.Step, ...]) -> tuple[undo.Step, ...]:
-    """A history whose chunks are as `present` writes them, so that states can share them.
+    """Returns a history with its chunks written in the present version.
 
-    Those that are not right stay as they are: going back to such a state says what is wrong.
+    So states can share chunks with those that `present` writes. An invalid chunk stays as it is:
+    the error is raised when someone goes back to such a state.
     """
 
     def renewed(chunk: Chunk) -> Chunk:
@@ -187,7 +192,7 @@ def _renewed(steps: tuple[undo.Step, ...]) -> tuple[undo.Step, ...]:
 
 
 def serialize(c: Container) -> bytes:
-    """The file of a container, in canonical order."""
+    """Returns the file of a container, with its chunks in canonical order."""
     chunks = present(c)
     if c.history:
         chunks.append(undo.encode(chunks, c.history, check.decompressed(c)))
@@ -195,7 +200,10 @@ def serialize(c: Container) -> bytes:
 
 
 def present(c: Container) -> list[Chunk]:
-    """All chunks but uNDO and TAIL: HEAD, LAYR, MESH, POSE, NETW, PLAN, TEXR, metadata, others."""
+    """Packs all chunks but uNDO and TAIL.
+
+    Their order is HEAD, LAYR, MESH, POSE, NETW, PLAN, TEXR, metadata, iNFO, tREE, mOTN, others.
+    """
     chunks = [Chunk(head.TYPE, pack(head.FIELDS, c.head))]
     for module, values in (
         (layr, c.layers), (mesh, c.meshes), (pose, c.poses), (netw, c.networks),

@@ -1,4 +1,4 @@
-"""HEAD: the canvas and how many of everything follow. Always the first chunk."""
+"""HEAD: the canvas, and the number of layers and networks that follow. Always the first chunk."""
 
 from .fields import Field
 

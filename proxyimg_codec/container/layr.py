@@ -1,4 +1,4 @@
-"""LAYR: name and boundary of one layer. They stand back to front, before all textures."""
+"""LAYR: name, box and boundary of one layer. These chunks stand back to front, before textures."""
 
 from .fields import Field
 

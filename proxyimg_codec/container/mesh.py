@@ -1,4 +1,4 @@
-"""MESH: the proxy nodes of one layer. They stand after all LAYR, in the order of the layers."""
+"""MESH: the mesh of one layer. These chunks stand after all LAYR, in the order of the layers."""
 
 from .fields import Field
 

@@ -1,4 +1,4 @@
-"""iCCp, eXIf, xMPd: metadata blocks carried as they are, compressed; and iNFO: how it was made."""
+"""iCCp, eXIf, xMPd: compressed metadata blocks; iNFO: the program that made the file."""
 
 import zstandard
 
@@ -16,10 +16,10 @@ FIELDS = (
 )
 
 MAGIC = b"\x28\xb5\x2f\xfd"
-"""What a zstd frame begins with."""
+"""First four bytes of a zstd frame."""
 
 WINDOW_MAX = 1 << 27
-"""Largest window of a zstd frame in bytes."""
+"""Largest window of a zstd frame, in bytes, that is accepted."""
 
 INFO_TYPE = "iNFO"
 
@@ -31,22 +31,27 @@ INFO_FIELDS = (
 
 
 def compress(block: bytes) -> bytes:
-    """Payload of a metadata chunk holding `block`."""
+    """Returns the payload of a metadata chunk that holds `block`."""
     return pack(FIELDS, {"size": len(block), "zstd": compressed(block)})
 
 
 def compressed(block: bytes) -> bytes:
-    """The zstd frame of a block."""
+    """Compresses a block to one zstd frame."""
     frame: bytes = zstandard.ZstdCompressor(level=19).compress(block)
     return frame
 
 
 def decompress(chunk: Chunk, where: str, budget: Budget) -> bytes:
-    """The block of a metadata chunk, never larger than the limit `metadata_bytes`.
+    """Decompresses the block of a metadata chunk.
+
+    Args:
+        chunk: The chunk.
+        where: Name of the chunk in error messages.
+        budget: Running budget of the file; its `metadata_bytes` bounds the block.
 
     Raises:
-        FormatError: Not a zstd frame of the stated size.
-        LimitError: Larger than the limit.
+        FormatError: The payload is not a zstd frame of the stated size.
+        LimitError: The block exceeds the budget.
     """
     values = unpack(FIELDS, chunk.payload, where, old=chunk.old)
     return decompressed(values["size"], values["zstd"], where, budget)
@@ -55,13 +60,18 @@ def decompress(chunk: Chunk, where: str, budget: Budget) -> bytes:
 def decompressed(
     size: int, frame: bytes, where: str, budget: Budget, rule: str = "CHK-16"
 ) -> bytes:
-    """The block of `size` bytes that `frame` holds, never larger than the limit `metadata_bytes`.
+    """Decompresses a zstd frame of known size.
 
-    `rule` is the one that asks for it.
+    Args:
+        size: Bytes of the content.
+        frame: The zstd frame.
+        where: Name of the chunk in error messages.
+        budget: Running budget of the file; its `metadata_bytes` bounds the content.
+        rule: Id of the rule that a wrong frame breaks.
 
     Raises:
-        FormatError: Not a zstd frame of that size.
-        LimitError: Larger than the limit.
+        FormatError: `frame` is not one zstd frame with `size` bytes of content.
+        LimitError: The content exceeds the budget, or the frame needs too large a window.
     """
     budget.spend("metadata_bytes", size)
     _check_window(frame, where)
@@ -89,10 +99,10 @@ def _check_window(frame: bytes, where: str) -> None:
 
 
 def _frame_end(data: bytes, where: str, rule: str) -> int:
-    """Length of the zstd frame that `data` starts with (RFC 8878, section 3.1.1).
+    """Length in bytes of the zstd frame at the start of `data` (RFC 8878, section 3.1.1).
 
     Raises:
-        FormatError: It starts with something else, or the frame is cut.
+        FormatError: `data` does not start with a zstd frame, or the frame is truncated.
     """
     if data[:4] != MAGIC:
         raise FormatError("metadata is not a zstd frame", where, rule=rule)

@@ -1,4 +1,4 @@
-"""mOTN: how the nodes of layers move over time. A reader that does not know it shows the still."""
+"""mOTN: motion of the nodes of layers over time. Readers that do not know it show the still."""
 
 from .fields import Field
 

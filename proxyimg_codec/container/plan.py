@@ -1,4 +1,4 @@
-"""PLAN: the planes of one raster, for the pyramid coder. Numbered in file order from 0."""
+"""PLAN: planes of one raster of the pyramid coder. These are numbered in file order from 0."""
 
 from .fields import Field
 

@@ -1,4 +1,4 @@
-"""POSE: the present state of one edited layer. They stand after all MESH, in layer order."""
+"""POSE: the pose of one edited layer. These chunks stand after all MESH, in layer order."""
 
 from .fields import Field
 

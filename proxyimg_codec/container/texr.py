@@ -9,8 +9,8 @@ from .fields import Field
 TYPE = "TEXR"
 
 SHARED, IMPLICIT, PYRAMID = 0, 1, 2
-"""Coders: the texture of an earlier layer; a plane of codes decoded by a network of the file; a
-view of planes."""
+"""Numbers of the coders: the texture of an earlier layer; a plane of codes that a network of the
+file decodes; a view of the planes of a raster."""
 
 _CODER = Field("coder", "int", "Texture coder: 0 = shared, 1 = implicit, 2 = pyramid.", 0, 255)
 
@@ -48,17 +48,19 @@ PYRAMID_FIELDS = (
 )  # fmt: skip
 
 CODERS = {SHARED: SHARED_FIELDS, IMPLICIT: FIELDS, PYRAMID: PYRAMID_FIELDS}
-"""Fields by coder."""
+"""Fields of TEXR by coder."""
 
 
 def fields_of(payload: bytes) -> tuple[Field, ...]:
-    """The fields of a payload, by its coder; those of the implicit coder if it has none.
+    """Declared fields of a TEXR payload, which depend on the coder that it names.
+
+    A payload that names none is taken for one of the implicit coder.
 
     Raises:
         UnsupportedError: The coder is not known.
     """
-    # The coder comes first: after the header, of one byte, and in a map after its key. It is a
-    # small integer, which is itself below 128, or follows a byte CC.
+    # The coder is the first value: it follows the header of one byte, in a map also its key. In
+    # msgpack an integer below 128 is one byte, its value; up to 255 it is a byte CC and the value.
     coder, key, header = IMPLICIT, b"\xa5coder", payload[:1]
     in_map = b"\x80" <= header < b"\x90" and payload.startswith(key, 1)
     if in_map or b"\x90" <= header < b"\xa0":
@@ -74,7 +76,11 @@ def fields_of(payload: bytes) -> tuple[Field, ...]:
 
 
 def mask_shape(fields: Mapping[str, Any]) -> tuple[int, int]:
-    """Rows and columns of cells over the part of a pyramid texture."""
+    """Rows and columns of the cells that cover the part of a pyramid texture.
+
+    Args:
+        fields: Values of TEXR with `part` and `cell`.
+    """
     _, _, width, height = fields["part"]
     side = 1 << fields["cell"]
     return -(-height // side), -(-width // side)

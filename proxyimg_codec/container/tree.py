@@ -1,4 +1,4 @@
-"""tREE: which layers belong together. Authoring data: drawing does not depend on it."""
+"""tREE: groups and parents of layers. This is authoring data: rendering does not depend on it."""
 
 from .fields import Field
 

@@ -1,6 +1,7 @@
-"""uNDO: earlier states of an edited picture, bound by hash to the present one.
+"""uNDO: earlier states of an edited picture, bound by a hash to the present state.
 
-Chunks that a state shares with the present one are referred to; all others are kept once, together.
+A state is a list of references to chunks. A chunk that it shares with the present state is not
+stored again; every other chunk is stored once for all states.
 """
 
 from __future__ import annotations
@@ -27,13 +28,13 @@ FIELDS = (
 )
 
 OLD_PREFIX = PREFIX.pack(SIGNATURE, 0, 2, 0)
-"""What `state` also covers in old files."""
+"""File prefix that the hash in `state` also covers in old files."""
 
 STEPS_MAX = 1 << 12
-"""Most steps that a file keeps; earlier ones are forgotten."""
+"""Most steps that a file keeps; older ones are dropped."""
 
 SIZE_MAX, CHUNKS_MAX = DEFAULT_LIMITS.metadata_bytes - 64, DEFAULT_LIMITS.chunks
-"""Most bytes and chunks of a history that readers accept; earlier steps are forgotten."""
+"""Most bytes and chunks of a history that readers accept; older steps are dropped."""
 
 
 @dataclass(frozen=True)
@@ -41,8 +42,8 @@ class Step:
     """One edit.
 
     Attributes:
-        operation: What was done, as JSON.
-        chunks: The state before it: all chunks of its file but uNDO and TAIL.
+        operation: The edit operation as JSON.
+        chunks: State before the edit: all chunks of its file but uNDO and TAIL.
     """
 
     operation: str
@@ -50,12 +51,14 @@ class Step:
 
 
 def encode(present: Sequence[Chunk], steps: Sequence[Step], beside: int = 0) -> Chunk:
-    """The chunk for a state and the steps that led to it.
+    """Returns the uNDO chunk for the present state and the steps that led to it.
+
+    The oldest steps are left out if the history would exceed what readers accept.
 
     Args:
         present: All other chunks of the file but TAIL.
-        steps: The oldest are left out where they make the file larger than readers accept.
-        beside: Bytes that these chunks decompress to.
+        steps: The steps, oldest first.
+        beside: Number of bytes that metadata and script in `present` decompress to.
     """
     number: dict[tuple[str, bytes], int] = {}
     for i, chunk in enumerate(present):
@@ -82,11 +85,20 @@ def encode(present: Sequence[Chunk], steps: Sequence[Step], beside: int = 0) -> 
 
 
 def decode(own: Chunk, present: Sequence[Chunk], where: str, budget: Budget) -> tuple[Step, ...]:
-    """Inverse of `encode`; nothing if the history belongs to another state.
+    """Decodes the steps of a uNDO chunk.
+
+    Args:
+        own: The uNDO chunk.
+        present: All other chunks of the file but TAIL.
+        where: Name of the chunk in error messages.
+        budget: Running budget of the file.
+
+    Returns:
+        The steps, oldest first; none if the history belongs to another state than `present`.
 
     Raises:
         FormatError: The history is corrupt.
-        LimitError: It exceeds `budget`.
+        LimitError: The history exceeds `budget`.
     """
     values = unpack(FIELDS, own.payload, where, old=own.old)
     if values["state"] != digest(present, own.old):
@@ -120,7 +132,7 @@ def decode(own: Chunk, present: Sequence[Chunk], where: str, budget: Budget) -> 
 
 
 def digest(chunks: Sequence[Chunk], old: bool = False) -> bytes:
-    """What binds a history to the state it leads to, in old files or in others."""
+    """SHA-256 of a state, which binds a history to it; `old` is for files up to version 0.3."""
     prefix = OLD_PREFIX if old else b""
     return hashlib.sha256(prefix + write(chunks)[PREFIX.size :]).digest()
 

@@ -1,1 +1,1 @@
-"""Entropy coding: interleaved rANS with an adaptive integer model. All arithmetic is integer."""
+"""Entropy coding: interleaved rANS with adaptive or tabulated models, in integer arithmetic."""

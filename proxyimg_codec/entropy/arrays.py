@@ -1,10 +1,10 @@
 """Adaptive coding of small integer arrays: codes, weights, path deltas and masks.
 
-Values of up to 8 bits in an array [C, H, W] are coded where a mask [H, W] says so. The upper
-(at most four) bits are coded with adaptive counts, selected by the already known neighbours; lower
-bits are stored raw. Positions are visited by wavefronts t = x + 2 y, so that left, upper left,
-upper and upper right neighbours are known while a whole wavefront is one array operation; counts
-change after a wavefront, never inside it.
+Values of up to 8 bits in an array [C, H, W] are coded at the positions of a mask [H, W]. Their
+upper bits, at most four, are coded with adaptive counts, which are selected by the neighbours coded
+before; the lower bits are stored raw. Positions are visited by wavefronts t = x + 2 y. So the left,
+upper left, upper and upper right neighbours are known, and a whole wavefront is one array
+operation. Counts change only after a wavefront.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from ..native import kernel
 from .rans import FEW, SCALE_BITS, Decoder, Encoder
 
 MODEL_BITS = 4
-"""Bits of a value that the adaptive model codes; lower ones are raw."""
+"""Most bits of a value that the adaptive model codes; lower bits are stored raw."""
 
 LANE_BITS = 1 << 12
-"""Bits a lane: few, as a group is many array operations here."""
+"""Bits of the stream per lane: few, so many lanes, because a group costs many array operations."""
 
 COUNT_START, COUNT_STEP, COUNT_LIMIT = 8, 32, 1 << 14
-"""Adaptation: initial count of a symbol, its increment, and the sum at which a row is halved."""
+"""Adaptation: initial count of a symbol, its increment, and the sum above which a row is halved."""
 
 Ints = NDArray[np.int64]
 Places = NDArray[np.int32]
 
 
 def _contexts(known: NDArray[np.int16], y: Places, x: Places, alphabet: int) -> NDArray[np.int16]:
-    """Context [n, C] of positions y, x [n] from `known` [H + 1, W + 2, C], where -1 is unknown."""
+    """Contexts [n, C] of positions y, x [n] from `known` [H + 1, W + 2, C]; -1 there is unknown."""
     left, up = known[y + 1, x], known[y, x + 1]
     upper_left, upper_right = known[y, x], known[y, x + 2]
     if alphabet == 2:
@@ -46,7 +46,7 @@ def _contexts(known: NDArray[np.int16], y: Places, x: Places, alphabet: int) -> 
 
 
 class _Model:
-    """Adaptive counts [channel, context, symbol] and the distributions made of them."""
+    """Adaptive counts [channel, context, symbol], and the distributions that follow from them."""
 
     def __init__(self, channels: int, alphabet: int) -> None:
         contexts = 16 if alphabet == 2 else alphabet + 1
@@ -59,9 +59,10 @@ class _Model:
         return (context.astype(np.int64) + self._channel).ravel()
 
     def cumulative(self, rows: Ints) -> Ints:
-        """Cumulative frequencies [n, A + 1]: every symbol has at least 1, all sum to 2**14.
+        """Cumulative frequencies [n, A + 1] of the A symbols of rows [n].
 
-        The rounding remainder goes to the last symbol.
+        Each symbol has a frequency of at least 1, and all add up to 2**14. The last symbol gets the
+        remainder of rounding.
         """
         counts = self._counts[rows]
         n, a = counts.shape
@@ -72,7 +73,7 @@ class _Model:
         return out
 
     def update(self, rows: Ints, symbols: Ints) -> None:
-        """Adds the symbols of one wavefront."""
+        """Counts the symbols [n] of one wavefront in their rows [n]."""
         np.add.at(self._counts, (rows, symbols), COUNT_STEP)
         touched = np.unique(rows)
         over = touched[self._counts[touched].sum(1) > COUNT_LIMIT]
@@ -80,16 +81,16 @@ class _Model:
 
 
 def _wavefronts(stored: NDArray[np.bool_]) -> tuple[Places, Places, Ints]:
-    """Stored positions y [N], x [N] in coding order, and where each wavefront starts [W + 1].
+    """Stored positions y [N], x [N] in coding order, and the start of each of W wavefronts [W + 1].
 
-    y ascends within a wavefront.
+    y ascends within a wavefront. The last start is N.
     """
     height, width = stored.shape
     t = np.arange(0, width + 2 * height - 2, 1 if width > 1 else 2)
     first = np.maximum((t - width + 2) // 2, 0)  # rows of wavefront t, from the first one on
     count = np.minimum(t // 2, height - 1) + 1 - first
     start = np.cumsum(count) - count
-    # Of all positions, as 32-bit integers: there may be many.
+    # 32-bit integers, because there may be many positions.
     y = np.arange(stored.size, dtype=np.int32)
     y -= np.repeat((start - first).astype(np.int32), count)
     x = np.repeat(t.astype(np.int32), count)
@@ -101,7 +102,13 @@ def _wavefronts(stored: NDArray[np.bool_]) -> tuple[Places, Places, Ints]:
 
 
 def encode(values: NDArray[np.integer], bits: int, stored: NDArray[np.bool_]) -> bytes:
-    """Codes `values` [C, H, W], in 0 .. 2**bits - 1 with bits in 1..8, where `stored` [H, W]."""
+    """Encodes an array at the stored positions.
+
+    Args:
+        values: [C, H, W] integers in 0..2**bits - 1.
+        bits: Bits per value, 1..8.
+        stored: bool [H, W], True at the positions that are coded.
+    """
     high = min(bits, MODEL_BITS)
     low = bits - high
     channels, height, width = values.shape
@@ -127,10 +134,19 @@ def encode(values: NDArray[np.integer], bits: int, stored: NDArray[np.bool_]) ->
 def decode(
     data: bytes, shape: tuple[int, int, int], bits: int, stored: NDArray[np.bool_]
 ) -> NDArray[np.uint8]:
-    """Inverse of `encode`: values [C, H, W]; 0 where not stored.
+    """Decodes an array that `encode` coded.
+
+    Args:
+        data: The coded array.
+        shape: C, H and W.
+        bits: Bits per value, 1..8.
+        stored: bool [H, W], True at the positions that are coded.
+
+    Returns:
+        uint8 [C, H, W] values; 0 where not stored.
 
     Raises:
-        FormatError: The stream is corrupt, or longer or shorter than its symbols.
+        FormatError: The stream is corrupt, too long or too short.
     """
     high = min(bits, MODEL_BITS)
     low = bits - high
@@ -149,7 +165,7 @@ def decode(
 def _decode_symbols(
     decoder: Decoder, known: NDArray[np.int16], stored: NDArray[np.bool_], alphabet: int
 ) -> None:
-    """Fills `known` [H + 1, W + 2, C] where `stored`."""
+    """Decodes symbols into `known` [H + 1, W + 2, C] at the stored positions [H, W]."""
     ys, xs, bounds = _wavefronts(stored)
     if kernel.available():
         words, states = decoder.words.astype(np.uint16), decoder.states.astype(np.uint32)
@@ -172,10 +188,10 @@ def _decode_symbols(
 
 
 def _decoded_row(decoder: Decoder, width: int, channels: int, alphabet: int) -> list[list[int]]:
-    """The symbols [width][channels] of a single row, one after the other.
+    """Decodes the symbols [width][channels] of an array of one row, one after the other.
 
-    Each of its positions is a wavefront, for which numpy takes longer. Of the neighbours only the
-    left one is known, and so it is the context.
+    Here each position is a wavefront of its own, and plain Python is faster than numpy. The only
+    known neighbour is the left one, so its symbol is the context.
     """
     contexts = alphabet + 1
     counts = [[COUNT_START] * alphabet for _ in range(channels * contexts)]
@@ -193,16 +209,16 @@ def _decoded_row(decoder: Decoder, width: int, channels: int, alphabet: int) -> 
 
 
 def pack_bits(values: Ints, width: int) -> bytes:
-    """Packs the low `width` bits of every value, most significant first, zero-padded to bytes."""
+    """Packs the low `width` bits of each value, most significant first, zero-padded to bytes."""
     planes = (values.ravel()[:, None] >> np.arange(width - 1, -1, -1)) & 1
     return np.packbits(planes.astype(np.uint8).ravel()).tobytes()
 
 
 def unpack_bits(data: bytes, shape: tuple[int, ...], width: int) -> NDArray[np.uint8]:
-    """Inverse of `pack_bits` for values of up to 8 bits; `data` must have exactly the right length.
+    """Unpacks values of `width` <= 8 bits, as `pack_bits` packed them, to uint8 of shape `shape`.
 
     Raises:
-        FormatError: Wrong length, or padding bits that are not zero.
+        FormatError: `data` has the wrong length, or padding bits that are not zero.
     """
     count = int(np.prod(shape)) * width
     if len(data) != (count + 7) // 8:

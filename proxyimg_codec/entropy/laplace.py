@@ -1,11 +1,12 @@
 """Tabulated distributions of latents: a mixture of two Laplace distributions, in integers.
 
-A latent y has a mean m, in 1/16, and a scale index s: the density is
+The context network predicts a mean m, in 1/16, and a scale index s of each latent. The density of
+the latent around m is
 
-    7/8 Laplace(b) + 1/8 Laplace(e b),    b = exp(s / 8 - 4),
+    7/8 Laplace(b) + 1/8 Laplace(e b),    b = exp(s / 8 - 4).
 
-the heavier second part for the errors that the context cannot foresee. Everything here is integer
-arithmetic, so that each decoder has the same tables (spec chapter 8).
+The second part is wider, for errors that the context cannot foresee. All arithmetic is integer, so
+that every decoder has the same tables (spec chapter 8).
 """
 
 from __future__ import annotations
@@ -20,25 +21,25 @@ from numpy.typing import NDArray
 from .rans import SCALE_BITS
 
 MEAN_BITS = 4
-"""Means have this many fractional bits."""
+"""Fractional bits of a mean."""
 
 SCALES = 64
 """Number of scale indices."""
 
 CERTAIN = 4
-"""Up to this scale index a latent whose mean is within 1/4 of 0 is 0 and takes no symbol."""
+"""Largest scale index at which a latent with a mean within ±1/4 is 0 and needs no symbol."""
 
 DIRECT = 40
-"""Above this scale index the low bits of a latent are coded as they are."""
+"""Largest scale index with a table; above it, the low bits of a latent are coded raw."""
 
 REACH = 31
-"""Largest difference from the rounded mean that has a symbol; others escape."""
+"""Largest difference from the rounded mean that can have a symbol; larger ones escape."""
 
 WIDTH = 2 * REACH + 2
-"""Symbols of a distribution at most: differences, and the escape, which is the last."""
+"""Most symbols of a distribution: the differences, and as the last symbol the escape."""
 
-# Low bits by scale index: the fewest that bring a scale to `DIRECT`. A halved scale has an index
-# that is less by 5.5.
+# Number of raw low bits by scale index: the fewest that bring the index down to `DIRECT`. Halving
+# the scale lowers its index by 5.5.
 SHIFTS = np.array(
     [min(r for r in range(8) if s - (11 * r + 1) // 2 <= DIRECT) for s in range(SCALES)]
 )
@@ -47,12 +48,12 @@ _HEAVIER = 8
 
 
 class Symbol(NamedTuple):
-    """Where latents are found in the tables, all int64 [N].
+    """Distributions of N latents; all arrays are int64 [N].
 
     Attributes:
         row: Row of `tables`, or -1 where the latent is certainly 0.
-        centre: What a difference of 0 stands for, after the shift.
-        shift: Number of low bits that are coded as they are.
+        centre: Value of the shifted latent (latent >> shift) that a difference of 0 stands for.
+        shift: Number of low bits that are coded raw.
     """
 
     row: NDArray[np.int64]
@@ -61,7 +62,7 @@ class Symbol(NamedTuple):
 
 
 def locate(mean: NDArray[np.int64], scale: NDArray[np.int64]) -> Symbol:
-    """The distributions of latents with `mean` [N] in 1/16 and `scale` [N] in 0..63."""
+    """Finds the distributions for means [N] in 1/16 and scale indices [N] in 0..63."""
     shift, index = SHIFTS.take(scale), scale
     if scale.max(initial=0) > DIRECT:
         index = scale - (11 * shift + 1) // 2
@@ -73,12 +74,13 @@ def locate(mean: NDArray[np.int64], scale: NDArray[np.int64]) -> Symbol:
 
 
 class Tables(NamedTuple):
-    """Cumulative frequencies of all rows.
+    """Tables of all distributions, one per row.
 
     Attributes:
-        ends: uint16 [rows, WIDTH + 1] cumulative frequency before each symbol, and after the
-            last; behind those that a row has, it is full.
-        reach: int64 [rows]: symbol i stands for the difference i - reach; 2 * reach + 1 escapes.
+        ends: uint16 [rows, WIDTH + 1] cumulative frequency before each symbol, and after the last.
+            A row with fewer symbols is filled up with the total frequency.
+        reach: int64 [rows] largest difference with a symbol. Symbol i stands for the difference
+            i - reach, and symbol 2 * reach + 1 for the escape.
     """
 
     ends: NDArray[np.uint16]
@@ -86,13 +88,13 @@ class Tables(NamedTuple):
 
 
 def reach_of(scale: int) -> int:
-    """Largest difference with a symbol of its own at a scale index of at most `DIRECT`."""
+    """Largest difference that has a symbol at a scale index of at most `DIRECT`."""
     return min(REACH, 2 + (20 * _decay_inverse(scale) >> 16))
 
 
 @functools.cache
 def decay(scale: int) -> int:
-    """exp(-1 / (16 b)) in units of 2**-30, rounded."""
+    """Decay exp(-1 / (16 b)) of a scale index in units of 2**-30, rounded."""
     with decimal.localcontext(prec=40):
         b = (decimal.Decimal(scale) / 8 - 4).exp()
         return int(((-1 / (16 * b)).exp() * _ONE).to_integral_value(decimal.ROUND_HALF_EVEN))
@@ -100,7 +102,7 @@ def decay(scale: int) -> int:
 
 @functools.cache
 def _decay_inverse(scale: int) -> int:
-    """The scale b in units of 2**-16, rounded."""
+    """Scale b of a scale index in units of 2**-16, rounded."""
     with decimal.localcontext(prec=40):
         b = (decimal.Decimal(scale) / 8 - 4).exp()
         return int((b * 65536).to_integral_value(decimal.ROUND_HALF_EVEN))
@@ -108,7 +110,7 @@ def _decay_inverse(scale: int) -> int:
 
 @functools.cache
 def tables() -> Tables:
-    """The tables; made once."""
+    """Computes the tables, once."""
     total = 1 << SCALE_BITS
     ends = np.full(((DIRECT + 1) * 16, WIDTH + 1), total, np.uint16)
     reaches = np.zeros(len(ends), np.int64)
@@ -117,7 +119,7 @@ def tables() -> Tables:
         reach = reach_of(scale)
         free = total - (2 * reach + 2)
         for part in range(16):
-            # Of the upper end of each difference, in 1/16 from the mean.
+            # Distance of the upper end of each difference from the mean, in 1/16.
             z = 16 * np.arange(-reach - 1, reach + 1) + 8 - (part - 8)
             below = np.where(z >= 0, (1 << 34) - tail[np.abs(z)], tail[np.abs(z)])
             mass = (below - below[0]) * free >> 34
@@ -129,7 +131,7 @@ def tables() -> Tables:
 
 
 def _powers(factor: int) -> NDArray[np.int64]:
-    """factor**n, n = 0.., in units of 2**-30: each is the last times `factor`, rounded half up."""
+    """Powers factor**n, n = 0, 1, .., in 2**-30; each is the one before times factor, rounded."""
     out = [_ONE]
     for _ in range(16 * (REACH + 2)):
         out.append((out[-1] * factor + (_ONE >> 1)) >> 30)

@@ -1,4 +1,4 @@
-"""A layer's boundary: closed cubic Bézier paths with integer control points, and their coding."""
+"""Boundary of a layer: closed cubic Bézier paths with integer control points, and their coding."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from ..errors import FormatError
 from . import deltas
 
 COORDINATE_MAX = 1 << 26
-"""Control points lie strictly within -COORDINATE_MAX .. COORDINATE_MAX units."""
+"""Bound of coordinates: control points are less than this in magnitude, in units."""
 
 
 @dataclass(frozen=True, eq=False)
 class Boundary:
-    """Closed paths filled by the nonzero rule.
+    """Closed paths, filled by the nonzero rule.
 
     Attributes:
         unit: Coordinates are multiples of 2**-unit canvas pixels; 0..6 in a file.
-        paths: For each path int64 [3 m, 2] control points (x, y): P0, C1, C2, P1, C3, C4, ...;
-            segment k runs through points 3k, 3k + 1, 3k + 2 and 3k + 3 modulo 3m.
+        paths: For each path of m segments int64 [3 m, 2] control points (x, y): P0, C1, C2, P1, C3,
+            C4, ... Segment k has the control points 3k, 3k + 1, 3k + 2 and 3k + 3 modulo 3m.
     """
 
     unit: int
@@ -35,7 +35,7 @@ class Boundary:
         return [len(p) // 3 for p in self.paths]
 
     def bounds(self) -> tuple[int, int, int, int]:
-        """x0, y0, x1, y1 of whole canvas pixels that hold all control points."""
+        """Smallest rectangle x0, y0, x1, y1 of whole pixels that holds all control points."""
         points = np.concatenate(self.paths)
         low = points.min(0) >> self.unit
         high = -(-points.max(0) >> self.unit)
@@ -43,7 +43,11 @@ class Boundary:
 
 
 def encode(boundary: Boundary | None) -> dict[str, Any]:
-    """The fields unit, segments, classes and deltas of LAYR; None is the whole canvas."""
+    """Encodes a boundary as the fields unit, segments, classes and deltas of LAYR.
+
+    Args:
+        boundary: Boundary at rest; None for the whole canvas.
+    """
     if boundary is None:
         return {"unit": 0, "segments": [], "classes": b"", "deltas": b""}
     starts = np.array([p[0] for p in boundary.paths])
@@ -60,10 +64,17 @@ def encode(boundary: Boundary | None) -> dict[str, Any]:
 
 
 def decode(fields: Mapping[str, Any], where: str) -> Boundary | None:
-    """Inverse of `encode`.
+    """Decodes the boundary of a layer.
+
+    Args:
+        fields: Values of LAYR.
+        where: Name of the chunk in error messages.
+
+    Returns:
+        The boundary at rest; None for the whole canvas.
 
     Raises:
-        FormatError: Corrupt streams or coordinates out of range.
+        FormatError: A stream is corrupt, or a coordinate is out of range.
     """
     if not fields["segments"]:
         if fields["classes"] or fields["deltas"] or fields["unit"]:

@@ -1,8 +1,9 @@
 """Anti-aliased coverage of closed Bézier paths in fixed point.
 
-Exact signed area of the flattened paths inside each output pixel (the cell accumulation of
-FreeType's smooth rasterizer), nonzero rule by clamping. Everything is integer: coordinates are in
-1/256 output pixel, coverage in 1/FULL, and no pixel depends on the tile it is computed in.
+Coverage is the exact signed area of the flattened paths inside each output pixel (the cell
+accumulation of FreeType's smooth rasterizer); clamping its magnitude stands for the nonzero rule.
+All arithmetic is integer: coordinates are in 1/256 output pixel, coverage in 1/FULL. No pixel
+depends on the tile in which it is computed.
 """
 
 from __future__ import annotations
@@ -19,32 +20,35 @@ from ..native import kernel
 Ints = NDArray[np.int64]
 
 ONE = 256
-"""Subdivisions of an output pixel."""
+"""Coordinate units of an output pixel."""
 
 FULL = 2 * ONE * ONE
-"""Coverage of a whole pixel."""
+"""Coverage of a pixel that is covered as a whole."""
 
 FLATNESS = 16
-"""Largest distance of a chord from its curve, in 1/256 output pixel (estimate)."""
+"""Estimated largest distance of a chord from its curve, in 1/256 output pixel."""
 
 MAX_LOG2_CHORDS = 8
 
 PIECES = 1 << 20
-"""Pieces of edges handled at a time; bounds memory."""
+"""Pieces of edges handled at a time, which bounds memory."""
 
 SCALED_MAX = 1 << 30
-"""Scaled coordinates are clamped to -SCALED_MAX .. SCALED_MAX, so that 64 bits are enough."""
+"""Bound to which scaled coordinates are clamped in magnitude, so that 64 bits are enough."""
 
 
 def to_output(points: Ints, unit: int, origin: int, size: int, pixels: int) -> Ints:
-    """One axis of control points in units of 2**-unit px -> 1/256 output pixel, rounded half up.
+    """Scales coordinates along one axis from the canvas to the output grid, rounded half up.
 
     Args:
-        points: Coordinates on the canvas.
-        unit: Binary fraction digits of `points`.
-        origin: Where the region starts, in canvas pixels.
+        points: int64 coordinates in units of 2**-unit canvas pixels, of any shape.
+        unit: Number of fractional bits of `points`.
+        origin: Start of the region in canvas pixels.
         size: Extent of the region in canvas pixels.
         pixels: Extent of the region in output pixels.
+
+    Returns:
+        int64 coordinates in 1/256 output pixel, from the start of the region, of the same shape.
     """
     ratio = Fraction(pixels * ONE, size << unit)
     numerator, denominator = ratio.numerator, ratio.denominator
@@ -54,11 +58,18 @@ def to_output(points: Ints, unit: int, origin: int, size: int, pixels: int) -> I
 
 
 def flatten(path: Ints) -> tuple[Ints, Ints]:
-    """Edges (start [N, 2], end [N, 2]) of a closed path [3 m, 2] in 1/256 output pixel.
+    """Flattens a closed path to chords.
 
-    Each segment becomes n = 2**k chords, evaluated exactly and rounded down to the grid; k is the
-    smallest with 3 d <= 4 FLATNESS n^2, where d is the largest second difference of its control
-    points (the bound 6 d / (8 n^2) on the distance of a chord, taken coordinate-wise).
+    Each segment becomes n = 2**k chords, whose ends are exact points of the curve, rounded down to
+    the grid. k is the smallest number with 3 d <= 4 FLATNESS n^2, at most `MAX_LOG2_CHORDS`, where
+    d is the largest second difference of the control points. This is the bound 6 d / (8 n^2) on the
+    distance of a chord from the curve, taken coordinate-wise.
+
+    Args:
+        path: int64 [3 m, 2] control points in 1/256 output pixel.
+
+    Returns:
+        Start and end of each chord, int64 [N, 2] each, in 1/256 output pixel.
     """
     p = _segments(path)
     return _chords(p, _log2_chords(p))
@@ -70,7 +81,7 @@ def _segments(path: Ints) -> Ints:
 
 
 def _log2_chords(p: Ints) -> Ints:
-    """Into how many chords each segment [m, 4, 2] is divided, as a power of two."""
+    """Base-2 logarithm [m] of the number of chords of each segment [m, 4, 2]."""
     d = np.abs(p[:, :2] - 2 * p[:, 1:3] + p[:, 2:]).max((1, 2))
     k = np.zeros(len(p), np.int64)
     for _ in range(MAX_LOG2_CHORDS):
@@ -79,7 +90,7 @@ def _log2_chords(p: Ints) -> Ints:
 
 
 def _chords(p: Ints, k: Ints) -> tuple[Ints, Ints]:
-    """Start [N, 2] and end [N, 2] of 2**k chords of each segment [m, 4, 2]."""
+    """Start [N, 2] and end [N, 2] of the 2**k chords of each segment [m, 4, 2]."""
     count = 1 << k
     segment = np.repeat(np.arange(len(p)), count)
     i = np.arange(len(segment)) - np.repeat(np.cumsum(count) - count, count)
@@ -102,23 +113,26 @@ def coverage(
     height: int,
     budget: Budget | None = None,
 ) -> NDArray[np.int32]:
-    """Coverage [height, width], 0..FULL, of the output pixels from column x0 and row y0 on.
+    """Computes the coverage of a rectangle of output pixels.
 
     Args:
-        paths: Closed paths [3 m, 2] in 1/256 output pixel, as `to_output` makes them.
-        x0: First column.
-        y0: First row.
-        width: Columns.
-        height: Rows.
-        budget: Bounds the edges and their pieces.
+        paths: Closed paths, int64 [3 m, 2] each, in 1/256 output pixel, as `to_output` makes them.
+        x0: First column of the rectangle.
+        y0: First row of the rectangle.
+        width: Number of columns.
+        height: Number of rows.
+        budget: Running budget, of which edges and their pieces spend `work`; by default a new one.
+
+    Returns:
+        int32 [height, width] coverage in 0..FULL.
 
     Raises:
-        LimitError: There are too many.
+        LimitError: There are too many edges or pieces.
     """
     budget = budget or Budget()
     corner = np.array([x0 * ONE, y0 * ONE])
     segments = np.concatenate([np.zeros((0, 4, 2), np.int64), *map(_segments, paths)]) - corner
-    # What lies above, below or to the right leaves no trace here.
+    # Segments above, below or to the right of the rectangle have no effect on it.
     low, high = segments.min(1), segments.max(1)
     near = (high[:, 1] > 0) & (low[:, 1] < height * ONE) & (low[:, 0] < width * ONE)
     segments = segments[near]
@@ -140,7 +154,7 @@ def coverage(
 
 
 def _batches(pieces: Ints, most: int, budget: Budget) -> Iterator[slice]:
-    """Slices of items that together make about `PIECES` pieces; an item makes at most `most`."""
+    """Spends the pieces [n] of items, each at most `most`, and yields slices of about `PIECES`."""
     total = np.cumsum(np.minimum(pieces, most))
     budget.spend("work", int(total[-1]) if len(total) else 0)
     start = 0
@@ -152,7 +166,7 @@ def _batches(pieces: Ints, most: int, budget: Budget) -> Iterator[slice]:
 
 
 def _split_rows(start: Ints, end: Ints, height: int) -> tuple[Ints, Ints, Ints, Ints]:
-    """Pieces of edges inside single rows: row, x at the top, x at the bottom, signed height."""
+    """Splits edges at rows; of each piece: row, x at the top, x at the bottom, signed height."""
     sloped = start[:, 1] != end[:, 1]
     start, end = start[sloped], end[sloped]
     down = (start[:, 1] < end[:, 1])[:, None]
@@ -170,10 +184,11 @@ def _split_rows(start: Ints, end: Ints, height: int) -> tuple[Ints, Ints, Ints, 
 
 
 def _accumulate(cells: Ints, row: Ints, x_in: Ints, x_out: Ints, dy: Ints, width: int) -> None:
-    """Adds row pieces to `cells` [height * (width + 2)], whose column 0 is all that lies left.
+    """Adds pieces of edges in rows to `cells` [height * (width + 2)].
 
-    A piece that crosses a cell at mean position m adds dy * (1 - m) to that cell and the rest to
-    the next one; a running sum along the row then gives the area.
+    Column 0 of the cells collects everything left of the rectangle. A piece that crosses a cell at
+    the mean position m adds dy * (1 - m) to that cell, and dy * m to the next one. A running sum
+    along the row then gives the area.
     """
     left, right = np.minimum(x_in, x_out), np.maximum(x_in, x_out)
     span, rise, sign = np.maximum(right - left, 1), np.abs(dy), np.sign(dy)

@@ -1,8 +1,8 @@
 """Constrained Delaunay triangulation of points with integer coordinates; every test is exact.
 
-Points are added from left to right and edges flipped until they are Delaunay (C. L. Lawson,
-"Software for C1 surface interpolation", 1977); constraints are recovered by flips (S. W. Sloan,
-"A fast algorithm for generating constrained Delaunay triangulations", 1993).
+Points are added from left to right, and edges are flipped until they are Delaunay (C. L. Lawson,
+"Software for C1 surface interpolation", 1977). Then constraints are recovered by flips
+(S. W. Sloan, "A fast algorithm for generating constrained Delaunay triangulations", 1993).
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ def triangulate(points: NDArray[np.int64], constraints: NDArray[np.int64]) -> ND
     """Triangulates the convex hull of `points`.
 
     Args:
-        points: int64 [N, 2], distinct, of any size.
-        constraints: int64 [C, 2] indices of the ends of segments that have to be edges. Where one
-            runs through another point it becomes several edges.
+        points: int64 [N, 2] distinct points, of any magnitude.
+        constraints: int64 [C, 2] indices of the two ends of segments that have to be edges. A
+            segment through another point becomes several edges.
 
     Returns:
-        int32 [T, 3] triangles with (b - a) x (c - a) > 0, each from its smallest index on, in
-        ascending order; none if all points lie on a line. No point lies inside the circumcircle
-        of a triangle unless a constraint stands between them. The same input always gives the
-        same triangles, also where four points lie on a circle.
+        int32 [T, 3] triangles with (b - a) x (c - a) > 0. Each begins with its smallest index, and
+        they are in ascending order. There are none if all points lie on a line. No point lies
+        inside the circumcircle of a triangle unless a constraint separates them. The same input
+        always gives the same triangles, even if four points lie on a circle.
 
     Raises:
         ValueError: Points coincide, or constraints cross or have a length of zero.
@@ -47,12 +47,13 @@ def triangulate(points: NDArray[np.int64], constraints: NDArray[np.int64]) -> ND
 
 
 class _Mesh:
-    """Triangles by their directed edges.
+    """Triangulation stored by directed edges.
 
     Attributes:
-        apex: The third corner of the triangle that has an edge (a, b) in this direction.
-        fan: For each vertex another one with an edge from it to there in `apex`.
-        fixed: Constraints recovered, in both directions.
+        at: Coordinates of the points.
+        apex: Third corner of the triangle that has the edge (a, b) in this direction.
+        fan: For each vertex a the end b of one edge (a, b) in `apex`.
+        fixed: Recovered constraints, in both directions.
     """
 
     def __init__(self, points: NDArray[np.int64]) -> None:
@@ -62,7 +63,7 @@ class _Mesh:
         self.fixed: set[Edge] = set()
 
     def turn(self, a: int, b: int, c: int) -> int:
-        """Twice the area of a triangle, (b - a) x (c - a)."""
+        """Twice the signed area of a triangle, (b - a) x (c - a)."""
         (ax, ay), (bx, by), (cx, cy) = self.at[a], self.at[b], self.at[c]
         return (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
 
@@ -83,14 +84,18 @@ class _Mesh:
         self.fan[a], self.fan[b], self.fan[c] = b, c, a
 
     def flip(self, a: int, b: int) -> Edge:
-        """Replaces the diagonal a-b of a strictly convex quadrilateral by the other one."""
+        """Replaces the diagonal a-b of a strictly convex quadrilateral by the other one.
+
+        Returns:
+            The ends of the new diagonal.
+        """
         c, d = self.apex.pop((a, b)), self.apex.pop((b, a))
         self.add(a, d, c)
         self.add(d, b, c)
         return c, d
 
     def settle(self, edges: list[Edge]) -> None:
-        """Flips edges, and those next to flipped ones, until all are Delaunay or fixed."""
+        """Flips edges, and then the edges around them, until all are Delaunay or fixed."""
         apex = self.apex
         while edges:
             a, b = edge = edges.pop()
@@ -101,7 +106,7 @@ class _Mesh:
             edges += [(a, d), (d, b), (b, c), (c, a)]
 
     def sweep(self, order: list[int]) -> None:
-        """Adds all points; `order` is ascending by x, then y, so each sees its predecessor."""
+        """Adds all points in `order`, by ascending x, then y; so each sees the one before it."""
         start = 2
         while start < len(order) and not self.turn(order[0], order[1], order[start]):
             start += 1
@@ -130,7 +135,7 @@ class _Mesh:
             self.settle(seen)  # the hull bulges between them, so new edges cannot be flipped yet
 
     def star(self, a: int) -> Iterator[Edge]:
-        """For each triangle around a vertex the edge opposite to it."""
+        """Yields the opposite edge of each triangle around a vertex."""
         first = u = self.fan[a]
         while (w := self.apex.get((a, u))) is not None:
             yield u, w
@@ -143,7 +148,7 @@ class _Mesh:
             w = u
 
     def crossed(self, a: int, b: int) -> tuple[list[Edge], int]:
-        """The edges that the segment from a to b crosses up to the next vertex, and that vertex."""
+        """Edges that the segment from a to b crosses up to the first vertex on it, and that one."""
         (ax, ay), (bx, by) = self.at[a], self.at[b]
         for u, w in self.star(a):
             right, left = self.turn(a, b, u), self.turn(a, b, w)
@@ -160,7 +165,11 @@ class _Mesh:
         return edges, v
 
     def force(self, a: int, b: int) -> None:
-        """Makes the segment from a to b an edge, or several if there are vertices on it."""
+        """Makes the segment from a to b an edge, or several edges if there are vertices on it.
+
+        Raises:
+            ValueError: The segment crosses another constraint, or a is b.
+        """
         if a == b:
             raise ValueError(f"the constraint from point {a} to itself has no length")
         while a != b:

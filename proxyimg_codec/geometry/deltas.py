@@ -1,4 +1,4 @@
-"""Coding of signed integers, mostly small: an adaptive class of magnitude, then raw bits."""
+"""Coding of mostly small signed integers: an adaptively coded class of magnitude, and raw bits."""
 
 from __future__ import annotations
 
@@ -11,11 +11,19 @@ from ..errors import FormatError
 Ints = NDArray[np.int64]
 
 _ESCAPE = 15
-"""Class of values of 15 bits and more, whose magnitude takes 31 raw bits."""
+"""Class of values of 15 bits and more, whose magnitude is stored in 31 raw bits."""
 
 
 def encode(values: Ints) -> tuple[bytes, bytes]:
-    """Classes (a coded array) and raw bits of `values` [C, N] or [C, H, N], each below 2**31."""
+    """Encodes signed integers.
+
+    Args:
+        values: int64 [C, N] or [C, H, N], less than 2**31 in magnitude.
+
+    Returns:
+        The classes as a coded array, and the raw bits: for each value but 0 a sign, and the bits of
+        its magnitude that its class leaves open.
+    """
     bits = np.where(values == 0, 0, np.floor(np.log2(np.maximum(np.abs(values), 1))) + 1)
     classes = np.minimum(bits.astype(np.int64), _ESCAPE)
     grid = classes.reshape(len(classes), -1, classes.shape[-1])
@@ -38,10 +46,22 @@ def _magnitude(value: int, klass: int) -> str:
 def decode(
     coded: bytes, raw: bytes, channels: int, count: int, where: str, rows: int = 1
 ) -> Ints:  # fmt: skip
-    """Inverse of `encode`: values [channels, rows * count].
+    """Decodes signed integers that `encode` coded.
+
+    Args:
+        coded: The coded array of classes.
+        raw: The raw bits.
+        channels: C of the encoded array.
+        count: N of the encoded array.
+        where: Name of the chunk in error messages.
+        rows: H of the encoded array.
+
+    Returns:
+        int64 [channels, rows * count] values.
 
     Raises:
-        FormatError: Corrupt streams, a wrong length, or a class that is larger than needed.
+        FormatError: A stream is corrupt, the raw bits have a wrong length, or a class is larger
+            than its value needs.
     """
     stored = np.ones((rows, count), bool)
     try:
@@ -52,7 +72,7 @@ def decode(
 
 
 def _read(data: bytes, classes: Ints, where: str) -> Ints:
-    """Signed values [N] from the raw bits after each class [N]."""
+    """Reads signed values [N] of the classes [N] from the raw bits."""
     width = np.where(classes == _ESCAPE, 32, classes)
     ends = np.cumsum(width)
     total = int(ends[-1])

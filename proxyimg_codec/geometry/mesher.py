@@ -1,4 +1,4 @@
-"""The default mesher: triangles of even size over the shape of a layer, in numpy alone."""
+"""Default mesher: triangles of even size over the shape of a layer, in numpy alone."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from .outline import CELLS, Outline, outline
 from .polygons import touching, winding
 
 EDGE_FRONT, EDGE_BACK = 0.05, 0.2
-"""Edge lengths of meshes relative to the diagonal of a layer (ProxyImg, l_r^f and l_r^b)."""
+"""Edge lengths relative to the diagonal of the layer: objects, back (ProxyImg, l_r^f, l_r^b)."""
 
 
 def derived(boundary: Boundary | None, size: tuple[int, int], edge: float | None = None) -> Mesh:
-    """A mesh for a layer whose file has none, as `delaunay` makes it.
+    """Makes a mesh by `delaunay` for a layer whose file has none.
 
     Args:
-        boundary: The layer's; None is the whole canvas.
+        boundary: Boundary of the layer at rest; None for the whole canvas.
         size: Width and height of the canvas in pixels.
-        edge: Length of edges as in `delaunay`; None = what suits edits.
+        edge: Target edge length as for `delaunay`; None = a length that suits edits.
 
     Raises:
         UsageError: `edge` is out of range.
@@ -41,16 +41,16 @@ def delaunay(boundary: Boundary | None, size: tuple[int, int], edge: float) -> B
     The same input gives the same mesh.
 
     Args:
-        boundary: The shape; None is the whole canvas.
-        size: Width and height of the canvas in pixels, for the shape None.
+        boundary: Boundary that encloses the shape; None for the whole canvas.
+        size: Width and height of the canvas in pixels; only used if `boundary` is None.
         edge: Target edge length relative to the diagonal of the box around the shape and two
             pixels of padding, 0.01..1; in pixels it is never less than 4.
 
     Returns:
-        A mesh without folds in which each directed edge occurs once and no two parts meet in a
+        A mesh without folds in which each directed edge occurs once, and no two parts meet in a
         single vertex. It has at most max(32, 9.3 / edge**2) triangles, usually fewer than
-        1 / edge**2: where the shape has too many parts or too rough an outline for that, they are
-        taken together.
+        1 / edge**2. If the shape has too many parts or too rough an outline for that, parts are
+        merged and the outline is simplified.
 
     Raises:
         UsageError: `edge` is out of range.
@@ -60,12 +60,12 @@ def delaunay(boundary: Boundary | None, size: tuple[int, int], edge: float) -> B
 
 
 def fill(shape: Outline, points: NDArray[np.int64]) -> Base:
-    """The constrained Delaunay mesh of an outline.
+    """Fills an outline with a constrained Delaunay triangulation.
 
     Args:
-        shape: What to fill.
-        points: int64 [P, 2] lattice points to use besides the corners of the loops; those
-            outside the loops are left out.
+        shape: The outline.
+        points: int64 [P, 2] lattice points to use besides the corners of the loops; points outside
+            the loops are left out.
     """
     corners = np.concatenate(shape.loops)
     vertices = np.unique(np.concatenate([corners, points]), axis=0)
@@ -75,7 +75,8 @@ def fill(shape: Outline, points: NDArray[np.int64]) -> Base:
         for loop in shape.loops
         for a, b in zip(loop.tolist(), np.roll(loop, -1, 0).tolist(), strict=True)
     ]
-    # Circles are to be round on the canvas; small factors keep the numbers short.
+    # The lattice is stretched, so that circumcircles are round on the canvas. Small factors are
+    # enough, and keep the integers short.
     stretch = np.maximum(np.rint(np.array(shape.step) * 64 / max(shape.step)), 1).astype(np.int64)
     triangles = triangulate(vertices * stretch, np.array(walls))
     middles = vertices[triangles].sum(1)
@@ -84,17 +85,21 @@ def fill(shape: Outline, points: NDArray[np.int64]) -> Base:
 
 
 def base(shape: Outline, vertices: NDArray[np.int64], triangles: NDArray[Any]) -> Base:
-    """A mesh of those lattice points [N, 2] that triangles [T, 3] use, numbered anew."""
+    """Makes a mesh of triangles [T, 3], with those of the lattice points [N, 2] that they use."""
     used, number = np.unique(triangles, return_inverse=True)
     renumbered = number.reshape(-1, 3).astype(np.int32)
     return Base(shape.origin, shape.step, vertices[used].astype(np.uint8), renumbered)
 
 
 def sound(mesh: Base, covered: NDArray[np.bool_]) -> bool:
-    """Whether a mesh that came from elsewhere keeps the promises of `Base` and covers a shape.
+    """Whether a mesh made by another program is a valid `Base` and covers a shape.
 
-    All triangles have to turn the right way, directed edges to be different, the rim to be made of
-    polygons that do not touch, and the cells [CELLS, CELLS] of `covered` to lie inside.
+    All triangles must have positive orientation, each directed edge must occur once, the rim must
+    consist of polygons that do not touch, and all cells of the shape must lie inside.
+
+    Args:
+        mesh: The mesh.
+        covered: bool [CELLS, CELLS], True for the lattice cells that hold a part of the shape.
     """
     corners = mesh.vertices[mesh.triangles].astype(np.int64)
     (ux, uy), (vx, vy) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
@@ -104,7 +109,7 @@ def sound(mesh: Base, covered: NDArray[np.bool_]) -> bool:
     polygons = [mesh.vertices[loop].astype(np.int64) for loop in loops]
     if touching(polygons).any():
         return False
-    # Segments with their control points on the thirds: one chord each.
+    # A segment with its inner control points at the thirds is straight, so it becomes one chord.
     thirds = np.arange(3)[:, None] * cover.ONE // 3
     paths = [
         (p[:, None] * cover.ONE + (np.roll(p, -1, 0) - p)[:, None] * thirds).reshape(-1, 2)
@@ -114,9 +119,14 @@ def sound(mesh: Base, covered: NDArray[np.bool_]) -> bool:
 
 
 def rim(triangles: NDArray[np.int32]) -> list[list[int]] | None:
-    """The loops of edges that belong to one triangle [T, 3], in the direction they have there.
+    """Loops of the edges at the rim of a mesh.
 
-    None if a directed edge occurs twice or loops meet in a vertex.
+    Args:
+        triangles: int32 [T, 3] vertices of each triangle.
+
+    Returns:
+        For each loop its vertices, in the direction of the triangles; None if a directed edge
+        occurs twice, or loops meet in a vertex.
     """
     edges = [(int(t[k]), int(t[(k + 1) % 3])) for t in triangles for k in range(3)]
     known = set(edges)

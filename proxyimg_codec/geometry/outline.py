@@ -1,4 +1,4 @@
-"""From the shape of a layer to what a mesh has to fill: simple polygons with room around it."""
+"""Outline that a mesh has to fill: simple polygons around the shape of a layer, with padding."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from .boundary import Boundary
 from .polygons import apart, area, simplified, untangled, winding
 
 CELLS = 255
-"""Cells of the lattice across and down; its points are 0..CELLS."""
+"""Cells of the lattice across and down; lattice points have the coordinates 0..CELLS."""
 
 PADDING = 2.5
-"""Canvas pixels between the shape and the edge of the mesh, at least: 2 from the centre of every
-pixel that the shape touches."""
+"""Least distance of the shape from the rim of the mesh, in canvas pixels. So every pixel that the
+shape touches has its centre at least 2 pixels inside."""
 
 EDGE_RANGE = 0.01, 1.0
-"""Target edge lengths that can be asked for, relative to the diagonal of the shape."""
+"""Range of the target edge length, relative to the diagonal of the shape."""
 
 SHORTEST = 4.0
-"""Shortest target edge length in canvas pixels: finer meshes would only divide the padding."""
+"""Shortest target edge length in canvas pixels; a finer mesh would only divide the padding."""
 
 ROUNDS = 5
-"""Attempts to get few enough triangles, each twice as coarse as the one before."""
+"""Number of attempts to get few enough triangles; each is twice as coarse as the one before."""
 
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
@@ -38,16 +38,17 @@ Box = tuple[int, int, int, int]
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """What a mesh has to fill, on a lattice over a padded rectangle.
+    """Polygons that a mesh has to fill, on a lattice over a padded rectangle.
 
     Attributes:
         origin: x, y in whole canvas pixels of lattice point (0, 0).
         step: Lattice spacing across and down in 1/1024 canvas pixel, positive multiples of 4.
-        covered: bool [CELLS, CELLS], the cells that hold a part of the shape.
-        loops: int64 [n, 2] corners of polygons in lattice coordinates, at most about an edge
-            length apart, filled by the nonzero rule: simple, without points in common, at least
-            `PADDING` from the shape; outer ones with positive area, holes with negative.
-        points: int64 [P, 2] points inside, an edge length apart and half of that from the loops.
+        covered: bool [CELLS, CELLS], True for the cells that hold a part of the shape.
+        loops: Polygons, int64 [n, 2] corners each in lattice coordinates, at most about an edge
+            length apart. They are simple, have no points in common, and lie at least `PADDING`
+            from the shape. Outer polygons have positive area, holes negative.
+        points: int64 [P, 2] lattice points inside, about an edge length from each other and at
+            least half of that from the loops.
         length: Target edge length in canvas pixels.
     """
 
@@ -60,30 +61,30 @@ class Outline:
 
     @property
     def scale(self) -> Floats:
-        """Canvas pixels of a lattice step across and down."""
+        """Lattice spacing across and down in canvas pixels, float64 [2]."""
         return np.array(self.step) / 1024
 
     @property
     def triangles(self) -> int:
-        """How many triangles fill the loops with these points, at most (Euler's formula)."""
+        """Most triangles that fill the loops with these points (Euler's formula)."""
         parts = sum(1 if area(p) > 0 else -1 for p in self.loops)
         return 2 * len(self.points) + sum(map(len, self.loops)) - 2 * parts
 
 
 def triangles_max(edge: float) -> int:
-    """Most triangles of an `outline`: eight times as many as fill a square, at least 32."""
+    """Most triangles of an outline: eight times those that fill a square, but at least 32."""
     return max(32, int(4 / (0.43 * edge**2)))
 
 
 def outline(boundary: Boundary | None, size: tuple[int, int], edge: float) -> Outline:
-    """The outline of a shape with its padding, simplified and divided into edges.
+    """Makes the outline of a padded shape, simplified and divided into edges.
 
-    Where it would take more than `triangles_max` triangles, padding and tolerance are doubled;
-    if that does not help, it is the rectangle.
+    If a mesh would have more than `triangles_max` triangles, padding and tolerance are doubled, in
+    at most `ROUNDS` attempts. If that does not help, the outline is the padded rectangle.
 
     Args:
-        boundary: The shape; None is the whole canvas.
-        size: Width and height of the canvas in pixels, for the shape None.
+        boundary: Boundary that encloses the shape; None for the whole canvas.
+        size: Width and height of the canvas in pixels; only used if `boundary` is None.
         edge: Target edge length relative to the diagonal of the box around the shape and its
             padding, 0.01..1; in pixels it is never less than `SHORTEST`.
 
@@ -95,7 +96,7 @@ def outline(boundary: Boundary | None, size: tuple[int, int], edge: float) -> Ou
     box = (0, 0, *size) if boundary is None else boundary.bounds()
     width, height = box[2] - box[0] + 2 * PADDING, box[3] - box[1] + 2 * PADDING
     length = max(edge * math.hypot(width, height), SHORTEST)
-    # So far from a slanting line are the steps of the cells that stand for it.
+    # Distance between a slanting line and the staircase of cells that stands for it.
     stairs = width * height / math.hypot(width, height) / CELLS
     tolerance, padding = max(1.5 * stairs, min(length / 8, SHORTEST)), PADDING
     for _ in range(ROUNDS):
@@ -109,7 +110,7 @@ def outline(boundary: Boundary | None, size: tuple[int, int], edge: float) -> Ou
 def _outline(
     boundary: Boundary | None, box: Box, padding: float, tolerance: float, length: float
 ) -> Outline:
-    """The outline that stays `padding` away from a shape; None fills the box."""
+    """Makes an outline at the distance `padding` around a shape; None is the shape of the box."""
     reach = padding + tolerance
     pad_x, step_x, across = _frame(box[2] - box[0], reach)
     pad_y, step_y, down = _frame(box[3] - box[1], reach)
@@ -120,7 +121,7 @@ def _outline(
     covered = _covered(boundary, origin, step)
     scale = np.array(step) / 1024
     chains = _trace(_without_contacts(_dilated(covered, across, down)))
-    # Small holes would only ask for small triangles, and the tolerance could turn them over.
+    # Small holes would need small triangles, and simplification could invert them.
     smallest = max(2 * tolerance, length / 4) ** 2 / scale.prod()
     filled = [c for c in chains if -smallest < area(c) < 0]
     chains = [c for c in chains if not -smallest < area(c) < 0]
@@ -132,7 +133,7 @@ def _outline(
 
 
 def _frame(extent: int, reach: float) -> tuple[int, int, int]:
-    """Along one axis: padding in pixels, lattice step, and the cells that make up `reach`."""
+    """Padding in pixels, lattice step, and number of cells for `reach` pixels, along one axis."""
     pad = math.ceil(reach)
     while True:
         step = 4 * -(-1024 * (extent + 2 * pad) // (4 * CELLS))
@@ -143,7 +144,7 @@ def _frame(extent: int, reach: float) -> tuple[int, int, int]:
 
 
 def _covered(boundary: Boundary, origin: tuple[int, int], step: tuple[int, int]) -> Bools:
-    """Cells [CELLS, CELLS] that hold a part of the shape or of its border."""
+    """Cells bool [CELLS, CELLS] that hold a part of the shape or of its boundary."""
     paths = [
         np.stack(
             [cover.to_output(p[:, k], boundary.unit, origin[k], step[k], 1024) for k in (0, 1)],
@@ -152,7 +153,7 @@ def _covered(boundary: Boundary, origin: tuple[int, int], step: tuple[int, int])
         for p in boundary.paths
     ]
     covered = cover.coverage(paths, 0, 0, CELLS, CELLS) > 0
-    # Parts that are thin or wound both ways can have no area in their cells.
+    # Parts that are thin, or wound in both directions, may have no area in their cells.
     for path in paths:
         start, end = cover.flatten(path)
         count = np.abs(end - start).max(1) // (cover.ONE // 2) + 1
@@ -165,7 +166,7 @@ def _covered(boundary: Boundary, origin: tuple[int, int], step: tuple[int, int])
 
 
 def _dilated(mask: Bools, across: int, down: int) -> Bools:
-    """True where a True cell is at most that many cells away across and down."""
+    """Mask dilated by a rectangle that reaches `across` and `down` cells to each side."""
     for axis, reach in ((1, across), (0, down)):
         total = np.cumsum(np.insert(mask, 0, False, axis=axis), axis=axis)
         at = np.arange(mask.shape[axis])
@@ -175,7 +176,7 @@ def _dilated(mask: Bools, across: int, down: int) -> Bools:
 
 
 def _without_contacts(mask: Bools) -> Bools:
-    """The mask with cells added until none touch at a corner alone."""
+    """Adds cells to a mask until no two cells touch only at a corner."""
     mask = mask.copy()
     while True:
         a, b, c, d = mask[:-1, :-1], mask[:-1, 1:], mask[1:, :-1], mask[1:, 1:]
@@ -187,7 +188,7 @@ def _without_contacts(mask: Bools) -> Bools:
 
 
 def _trace(mask: Bools) -> list[Ints]:
-    """Loops along the borders of the cells, each as all its lattice points in order, [n, 2]."""
+    """Traces the borders of a mask of cells: loops of all lattice points in order, [n, 2] each."""
     solid = np.pad(mask, 1)
     width = CELLS + 1
     follows: dict[int, int] = {}
@@ -213,9 +214,10 @@ def _trace(mask: Bools) -> list[Ints]:
 
 
 def _inside(loops: Sequence[Ints], scale: Floats, length: float) -> Ints:
-    """Points of a near equilateral lattice inside, not closer than half of `length` to the loops.
+    """Points inside, on a nearly equilateral lattice, at least half of `length` from the loops.
 
-    Its spacings are whole, so that each point is exactly where the coding of a mesh expects it.
+    Spacings are whole lattice steps, so each point is exactly where the coding of a mesh predicts
+    it.
     """
     half = max(round(length / scale[0] / 2), 1)
     down = max(round(length * math.sqrt(0.75) / scale[1]), 1)

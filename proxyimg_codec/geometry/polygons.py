@@ -1,4 +1,4 @@
-"""Closed polygons: simplifying them without tangles, and what lies inside and near them."""
+"""Closed polygons: simplification without self-crossings, and tests for points inside and near."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ Floats = NDArray[np.float64]
 
 
 def area(loop: Ints) -> float:
-    """Signed area of a polygon [n, 2], positive if it goes round as triangles of meshes do."""
+    """Signed area of a polygon [n, 2], positive for the orientation of the triangles of meshes."""
     x, y = loop.T
     return float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
 
 
 def _off(points: Floats, a: Floats, b: Floats) -> Floats:
-    """Squared distance of points [N, 2] from the segment between a and b."""
+    """Squared distances [N] of points [N, 2] from the segment between a and b."""
     chord, to = b - a, points - a
     place = np.clip(to @ chord / max(float(chord @ chord), 1e-12), 0, 1)
     squares: Floats = ((to - place[:, None] * chord) ** 2).sum(1)
@@ -30,12 +30,20 @@ def _off(points: Floats, a: Floats, b: Floats) -> Floats:
 
 
 def simplified(chain: Floats, tolerance: float, length: float) -> list[int]:
-    """Which points of a closed chain [n, 2] to keep, ascending.
+    """Simplifies a closed chain of points.
 
-    No point of the chain is further than `tolerance` from the edge in its place (Douglas and
-    Peucker, "Algorithms for the reduction of the number of points", 1973), and straight parts
-    are divided evenly into pieces of about `length`. So points deeper inside than the tolerance
-    stay inside, as often as polygons wind round them.
+    No point of the chain is further than `tolerance` from the edge that replaces its part (Douglas
+    and Peucker, "Algorithms for the reduction of the number of points", 1973). Straight parts are
+    divided evenly into pieces of about `length`. A point further than the tolerance from the chain
+    keeps its winding number.
+
+    Args:
+        chain: float64 [n, 2] points.
+        tolerance: Largest distance, in the unit of the points.
+        length: Length of edges, in the unit of the points.
+
+    Returns:
+        Ascending indices of the points to keep.
     """
     n = len(chain)
     first = int(np.argmax(((chain - chain.mean(0)) ** 2).sum(1)))
@@ -61,14 +69,17 @@ def simplified(chain: Floats, tolerance: float, length: float) -> list[int]:
 
 
 def untangled(chains: Sequence[Ints], kept: list[list[int]], scale: Floats) -> tuple[Ints, ...]:
-    """The polygons of the kept points, with more of the chains where they touched or crossed.
+    """Makes polygons of the kept points, and adds points until no polygons touch or cross.
 
-    The chains themselves do not touch, so this ends. What shrank to a line is left out.
+    The chains themselves do not touch, so this ends. Chains that shrank to a line are left out.
 
     Args:
-        chains: Closed chains [n, 2] of lattice points.
-        kept: For each which points to keep, ascending.
-        scale: Canvas pixels of a lattice step across and down.
+        chains: Closed chains, int64 [n, 2] lattice points each.
+        kept: For each chain the ascending indices of the points to keep.
+        scale: Lattice spacing across and down in canvas pixels.
+
+    Returns:
+        The polygons, int64 [m, 2] each.
     """
     while True:
         pairs = [(c, k) for c, k in zip(chains, kept, strict=True) if len(k) > 2]
@@ -93,10 +104,13 @@ def _ends(loops: Sequence[Ints]) -> Ints:
 
 
 def touching(loops: Sequence[Ints]) -> Bools:
-    """Which edges of all polygons together touch others, but for the ends of neighbours.
+    """Tells which edges touch or cross other edges, except at the common end of two neighbours.
 
     Args:
-        loops: Polygons [n, 2] of at least three different points.
+        loops: Polygons, int64 [n, 2] each, of at least three different points.
+
+    Returns:
+        bool [N] for all edges of all polygons in order; edge i of a polygon starts at point i.
     """
     a = np.concatenate(loops)
     b = np.concatenate([np.roll(p, -1, 0) for p in loops])
@@ -117,13 +131,13 @@ def touching(loops: Sequence[Ints]) -> Bools:
 
 
 def _side(a: Ints, b: Ints, p: NDArray[Any]) -> NDArray[Any]:
-    """Sign of (b - a) x (p - a)."""
+    """Sign of (b - a) x (p - a): the side of the line from a to b on which p lies."""
     u, v = b - a, p - a
     return np.sign(u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0])
 
 
 def winding(points: NDArray[Any], loops: Sequence[Ints]) -> Ints:
-    """How often polygons wind round points [N, 2] that lie on none of them, int64 [N]."""
+    """Winding numbers int64 [N] of polygons [n, 2] around points [N, 2] that lie on none."""
     total = np.zeros(len(points), np.int64)
     for loop in loops:
         for a, b in zip(loop, np.roll(loop, -1, 0), strict=True):
@@ -135,13 +149,16 @@ def winding(points: NDArray[Any], loops: Sequence[Ints]) -> Ints:
 
 
 def apart(points: Ints, loops: Sequence[Ints], scale: Floats, distance: float) -> Bools:
-    """Which points [N, 2] are further than `distance` in canvas pixels from all polygons.
+    """Tells which points are further than `distance` from all polygons.
 
     Args:
-        points: In lattice coordinates.
-        loops: Polygons, likewise.
-        scale: Canvas pixels of a lattice step across and down.
-        distance: In canvas pixels.
+        points: int64 [N, 2] in lattice coordinates.
+        loops: Polygons, int64 [n, 2] each, in lattice coordinates.
+        scale: Lattice spacing across and down in canvas pixels.
+        distance: Distance in canvas pixels.
+
+    Returns:
+        bool [N].
     """
     result = np.ones(len(points), np.bool_)
     for loop in loops:

@@ -1,6 +1,6 @@
-"""The present state of a layer: where it was moved, how it was bent, how it is shown.
+"""Pose of a layer: the place, shape and colour that edits have given it.
 
-A pose stands over the geometry at rest: first its nodes are displaced, then an affine map is
+A pose is applied to the geometry at rest: first the nodes are displaced, then an affine map is
 applied. Both are fixed-point, so that moving there and back is exact.
 """
 
@@ -21,47 +21,56 @@ from .mesh import FRACTION_BITS, Mesh, Refined
 
 Ints = NDArray[np.int64]
 Matrix = tuple[float, float, float, float, float, float]
-"""a, b, c, d, e, f: x' = a x + c y + e, y' = b x + d y + f, in canvas pixels (as in SVG)."""
+"""Affine map a, b, c, d, e, f: x' = a x + c y + e, y' = b x + d y + f, in pixels (as in SVG)."""
 
 MATRIX_BITS = 24
+"""Fractional bits of the entries of the matrix."""
+
 MATRIX_MAX = 1 << 31
-"""Matrix entries are in 2**-24 and below 2**31: less than 128 times larger."""
+"""Bound of the magnitude of matrix entries, in 2**-24: less than 128 times larger."""
 
 SHIFT_MAX = 1 << 33
-"""Shifts are in 1/1024 px and below 2**33."""
+"""Bound of the magnitude of shifts, in 1/1024 canvas pixel."""
 
 POINT_MAX = 1 << 30
-"""Points are clamped to that many 1/1024 px before they are mapped."""
+"""Bound to which coordinates are clamped before they are mapped, in 1/1024 canvas pixel."""
 
 NODE_BITS = 4
-"""Displacements of nodes are in 1/16 px."""
+"""Fractional bits of displacements of nodes: they are in 1/16 canvas pixel."""
 
 NODE_MAX = 1 << 24
+"""Bound of the magnitude of displacements of nodes, in 1/16 canvas pixel."""
 
 OPACITY_MAX = 65535
+"""Opacity of a layer that is drawn in full."""
+
 COLOUR_BITS = 12
+"""Fractional bits of the entries of the colour matrix."""
+
 COLOUR_MAX = 1 << 20
-"""Entries of the colour matrix are in 2**-12 and at most 2**20 in magnitude."""
+"""Largest magnitude of an entry of the colour matrix, in 2**-12."""
 
 _UNIT = 1 << MATRIX_BITS
 
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """What edits have done to a layer.
+    """Result of all edits of place, shape and colour of a layer, and of its motion at a moment.
 
     Attributes:
         matrix: a, b, c, d of the affine map in 2**-24.
         shift: e, f of the affine map in 1/1024 canvas pixel.
         nodes: int64 [N, 2] displacement of each node in 1/16 canvas pixel, or None.
-        places: int64 [N, 2] displacement of the point of the texture that each node shows, in
-            1/16 canvas pixel, or None.
-        opacity: 0..65535.
+        places: int64 [N, 2] displacement of the texture point that each node shows, in 1/16 canvas
+            pixel, or None.
+        opacity: Opacity in 0..65535.
         hidden: Whether the layer is not drawn.
-        colour: Rows of a 3 x 4 matrix in 2**-12 that maps colour and one to colour, or ().
-        sway: int64 [N, 2] further displacement of each node in 1/1024 canvas pixel, at a moment of
-            a timeline, or None.
-        body: The body that it sways with, or None: layers of one body sway as one.
+        colour: The 12 entries of a 3 x 4 matrix, row by row, in 2**-12, which maps (red, green,
+            blue, 1) to colour; () for none.
+        sway: int64 [N, 2] displacement of each node by the motion at a moment, in 1/1024 canvas
+            pixel, in addition to `nodes`; or None.
+        body: Number of the body that the layer moves with at that moment, or None; layers of one
+            body move as one.
     """
 
     matrix: tuple[int, int, int, int] = (_UNIT, 0, 0, _UNIT)
@@ -76,12 +85,12 @@ class Pose:
 
     @property
     def affine(self) -> bool:
-        """Whether the affine map does anything."""
+        """Whether the affine map is not the identity."""
         return self.matrix != (_UNIT, 0, 0, _UNIT) or self.shift != (0, 0)
 
     @property
     def mirrored(self) -> bool:
-        """Whether the affine map exchanges left and right turns."""
+        """Whether the affine map has a negative determinant, so that it reverses orientation."""
         a, b, c, d = self.matrix
         return a * d < b * c
 
@@ -97,7 +106,7 @@ class Pose:
 
     @property
     def displacements(self) -> Ints:
-        """int64 [N, 2] displacement of each node in 1/1024 canvas pixel, where `displaced`."""
+        """Displacement of each node, int64 [N, 2] in 1/1024 canvas pixel; only if `displaced`."""
         parts = [v for v in (self.sway,) if v is not None]
         if self.nodes is not None:
             parts.append(self.nodes << (FRACTION_BITS - NODE_BITS))
@@ -105,12 +114,16 @@ class Pose:
 
     @property
     def at_rest(self) -> bool:
-        """Whether nothing was done at all."""
+        """Whether the pose changes nothing."""
         plain = self.opacity == OPACITY_MAX and not self.hidden and not self.colour
         return plain and not self.affine and not self.bent
 
     def still(self, other: Pose) -> bool:
-        """Whether layers in these poses lie to each other as at rest, and are drawn in full."""
+        """Whether a layer in this pose and one in the pose `other` rest on each other [PYR-46].
+
+        They do if both have moved alike, neither has displacements by edits, and both are drawn in
+        full.
+        """
         alike = (self.matrix, self.shift, self.body) == (other.matrix, other.shift, other.body)
         return alike and not any(
             p.nodes is not None or p.places is not None or p.hidden or p.opacity != OPACITY_MAX
@@ -119,13 +132,13 @@ class Pose:
 
     @property
     def floats(self) -> Matrix:
-        """The affine map in canvas pixels."""
+        """Affine map as floating-point numbers, in canvas pixels."""
         a, b, c, d = (v / _UNIT for v in self.matrix)
         e, f = (v / (1 << FRACTION_BITS) for v in self.shift)
         return a, b, c, d, e, f
 
     def apply(self, points: Ints) -> Ints:
-        """Maps points [N, 2] in 1/1024 canvas pixel; exact, half up."""
+        """Applies the affine map to points int64 [N, 2] in 1/1024 canvas pixel, rounded half up."""
         if not self.affine:
             return points
         x, y = np.clip(points, -POINT_MAX, POINT_MAX).T
@@ -140,11 +153,11 @@ class Pose:
         )
 
     def present(self, refined: Refined) -> Ints:
-        """Present positions [N, 2] of all nodes in 1/1024 canvas pixel."""
+        """Present positions of all nodes, int64 [N, 2] in 1/1024 canvas pixel."""
         return self.apply(refined.nodes + self.displacements if self.displaced else refined.nodes)
 
     def frozen(self) -> Pose:
-        """The pose with its sway among the displacements of its nodes, in 1/16 px, half up."""
+        """Returns the pose with `sway` added to `nodes`, rounded half up to 1/16 canvas pixel."""
         if self.sway is None:
             return self
         shift = FRACTION_BITS - NODE_BITS
@@ -153,19 +166,20 @@ class Pose:
 
 
 REST = Pose()
+"""Pose that changes nothing."""
 
 
 def inverse(matrix: Matrix) -> Matrix:
-    """The inverse of an affine map; its determinant must not be 0."""
+    """Inverse of an affine map, whose determinant must not be 0."""
     a, b, c, d, e, f = matrix
-    # Exact: in floating point the determinant of a map that is not singular can become 0.
+    # Exact, because in floating point the determinant of a map that is not singular can become 0.
     det = float(Fraction(a) * Fraction(d) - Fraction(b) * Fraction(c))
     a, b, c, d = d / det, -b / det, -c / det, a / det
     return a, b, c, d, -(a * e + c * f), -(b * e + d * f)
 
 
 def product(outer: Matrix, inner: Matrix) -> Matrix:
-    """The affine map that does `inner` first, then `outer`."""
+    """Affine map that applies `inner` first, then `outer`."""
     a, b, c, d, e, f = outer
     p, q, r, s, t, u = inner
     return (
@@ -175,7 +189,11 @@ def product(outer: Matrix, inner: Matrix) -> Matrix:
 
 
 def fixed(matrix: Matrix) -> tuple[tuple[int, int, int, int], tuple[int, int]] | None:
-    """Matrix and shift of a pose, rounded; None if it is singular or leaves the range."""
+    """Rounds an affine map to `matrix` and `shift` of a pose.
+
+    Returns:
+        Matrix and shift; None if they are singular, out of range or not finite.
+    """
     if not all(map(math.isfinite, matrix)):
         return None
     a, b, c, d = (round(v * _UNIT) for v in matrix[:4])
@@ -186,7 +204,14 @@ def fixed(matrix: Matrix) -> tuple[tuple[int, int, int, int], tuple[int, int]] |
 
 
 def encode(pose: Pose, mesh: Mesh | None) -> dict[str, Any]:
-    """The fields of POSE, without the layer; a sway is rounded to displacements of nodes."""
+    """Encodes a pose as the fields of POSE, without the number of the layer.
+
+    A motion at a moment (`sway`) becomes displacements of nodes; see `Pose.frozen`.
+
+    Args:
+        pose: The pose.
+        mesh: Mesh of the layer; needed if the pose has displacements.
+    """
     pose = pose.frozen()
     out: dict[str, Any] = {
         "matrix": list(pose.matrix), "shift": list(pose.shift), "opacity": pose.opacity,
@@ -202,11 +227,16 @@ def encode(pose: Pose, mesh: Mesh | None) -> dict[str, Any]:
 
 
 def decode(fields: Mapping[str, Any], mesh: Mesh | None, where: str) -> Pose:
-    """Inverse of `encode`.
+    """Decodes a pose.
+
+    Args:
+        fields: Values of POSE.
+        mesh: Mesh of the layer, or None.
+        where: Name of the chunk in error messages.
 
     Raises:
-        FormatError: Corrupt streams, displacements without a mesh, a singular matrix, or a pose
-            that does nothing.
+        FormatError: A stream or the mesh is corrupt, displacements have no mesh, the matrix is
+            singular, or the pose changes nothing.
     """
     a, b, c, d = fields["matrix"]
     if a * d == b * c:
@@ -240,9 +270,17 @@ def decode(fields: Mapping[str, Any], mesh: Mesh | None, where: str) -> Pose:
 
 
 def residuals(values: Ints, refined: Refined) -> Ints:
-    """Values [N, C] of nodes less their prediction from others.
+    """Subtracts from values of nodes their prediction from other nodes.
 
-    That is the vertex before, or the mean, rounded down, of the ends that a midpoint lies between.
+    A vertex is predicted by the vertex before it, the first one by 0. A midpoint is predicted by
+    the mean, rounded down, of the two nodes that it lies between.
+
+    Args:
+        values: int64 [N, C] values of the nodes.
+        refined: The mesh of the nodes.
+
+    Returns:
+        int64 [N, C] residuals.
     """
     own = refined.parents[:, 0] == refined.parents[:, 1]
     before = np.concatenate([values[:1] * 0, values[:-1]])
@@ -251,13 +289,13 @@ def residuals(values: Ints, refined: Refined) -> Ints:
 
 
 def restored(residuals: Ints, refined: Refined) -> Ints:
-    """Inverse of `residuals`."""
+    """Restores the values int64 [N, C] from `residuals`."""
     count = int((refined.parents[:, 0] == refined.parents[:, 1]).sum())
     out = residuals.copy()
     out[:count] = np.cumsum(residuals[:count], axis=0)
     done = count
     while done < len(out):
-        # Midpoints are numbered by level: those whose ends are known come next.
+        # Midpoints are numbered by level, so those with known ends come first.
         ready = (refined.parents[done:] < done).all(1)
         stop = len(out) if ready.all() else done + int(np.argmin(ready))
         ends = refined.parents[done:stop]

@@ -1,4 +1,4 @@
-"""Which triangle holds each sample of a grid."""
+"""Rasterization of triangles: the triangle that holds each sample of a grid."""
 
 from __future__ import annotations
 
@@ -12,27 +12,32 @@ from ..limits import SAMPLE_COST_BITS, Budget
 Floats = NDArray[np.float64]
 
 BATCH = 1 << 21
-"""Rows, and samples, handled at a time; bounds memory."""
+"""Rows of triangles, and samples in them, handled at a time, which bounds memory."""
 
 
 def rasterize(
     corners: Floats, x0: int, y0: int, width: int, height: int, budget: Budget | None = None
 ) -> NDArray[np.int32]:
-    """The triangle [height, width] that holds the centre of each sample, or -1.
+    """Finds the triangle that holds the centre of each sample of a rectangle.
 
-    Where triangles overlap, those with positive orientation come first, then the lowest number.
-    Triangles that share an edge leave no gap: both compute its crossings by the same formula.
+    Where triangles overlap, one with positive orientation wins over others, then the one with the
+    lowest number. Triangles that share an edge leave no gap, because both compute the crossings of
+    the edge with rows by the same formula.
 
     Args:
-        corners: [T, 3, 2] x, y; sample (i, j) has its centre at (i + 0.5, j + 0.5).
-        x0: First column.
-        y0: First row.
-        width: Columns.
-        height: Rows.
-        budget: Bounds how often samples may be covered.
+        corners: float64 [T, 3, 2] corners x, y in samples; the sample in column i and row j has its
+            centre at (i + 0.5, j + 0.5).
+        x0: First column of the rectangle.
+        y0: First row of the rectangle.
+        width: Number of columns.
+        height: Number of rows.
+        budget: Running budget of the rendering; by default a new one.
+
+    Returns:
+        int32 [height, width] numbers of triangles; -1 where there is none.
 
     Raises:
-        LimitError: The triangles cover the grid too often.
+        LimitError: There are too many triangles, or they cover the rectangle too often.
     """
     budget = budget or Budget()
     out = np.full(height * width, -1, np.int32)
@@ -46,7 +51,8 @@ def rasterize(
     for part in _batches(_rows(corners[order], y0, height)):
         triangle, row, first, last = _spans(corners[order[part]], x0, y0, width, height)
         count = np.maximum(last - first, 0)
-        # Rows count too, less one a triangle: narrow triangles cost work and cover nothing.
+        # Rows count too, less one per triangle: narrow triangles cost work even if they hold no
+        # sample.
         spent = int(count.sum()) + max(len(row) - len(order[part]), 0)
         budget.spend("multiply_adds", spent + len(corners) << SAMPLE_COST_BITS)
         covered += spent
@@ -55,13 +61,13 @@ def rasterize(
             span = np.repeat(np.arange(some.start, some.stop), count[some])
             ends = np.cumsum(count[some])
             column = np.arange(len(span)) - np.repeat(ends - count[some], count[some]) + first[span]
-            # numpy keeps the last of several values for one place, so what is drawn later wins.
+            # Of several values for one place numpy keeps the last, so triangles drawn later win.
             out[row[span] * width + column] = order[part][triangle[span]]
     return out.reshape(height, width)
 
 
 def _batches(count: NDArray[np.int64]) -> Iterator[slice]:
-    """Slices of items that together count about `BATCH`."""
+    """Yields slices of items whose counts [n] add up to about `BATCH`."""
     total = np.cumsum(count)
     start = 0
     while start < len(count):
@@ -72,7 +78,7 @@ def _batches(count: NDArray[np.int64]) -> Iterator[slice]:
 
 
 def _rows(corners: Floats, y0: int, height: int) -> NDArray[np.int64]:
-    """How many rows each triangle crosses."""
+    """Number of rows [T] that each triangle crosses."""
     y = corners[..., 1]
     top = np.clip(np.ceil(y.min(1) - 0.5), y0, y0 + height)
     bottom = np.clip(np.ceil(y.max(1) - 0.5), y0, y0 + height)
@@ -83,7 +89,7 @@ def _rows(corners: Floats, y0: int, height: int) -> NDArray[np.int64]:
 def _spans(
     corners: Floats, x0: int, y0: int, width: int, height: int
 ) -> tuple[NDArray[np.int64], ...]:
-    """Triangle, row, first column and the one after the last, of each row of each triangle."""
+    """Triangle, row, first column, and column after the last, for each row of each triangle."""
     y = corners[..., 1]
     top = np.clip(np.ceil(y.min(1) - 0.5), y0, y0 + height).astype(np.int64)
     count = _rows(corners, y0, height)
@@ -94,7 +100,7 @@ def _spans(
     high = np.full(len(row), -np.inf)
     for i, j in ((0, 1), (1, 2), (2, 0)):
         p, q = corners[:, i], corners[:, j]
-        # Both triangles of an edge go along it in the same direction.
+        # The two triangles of an edge have to run along it in the same direction.
         swap = (p[:, 1] > q[:, 1]) | ((p[:, 1] == q[:, 1]) & (p[:, 0] > q[:, 0]))
         p, q = np.where(swap[:, None], q, p), np.where(swap[:, None], p, q)
         rise = q[:, 1] - p[:, 1]

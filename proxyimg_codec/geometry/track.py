@@ -1,10 +1,10 @@
-"""How the nodes of a layer move: a few shapes, each with a curve over time, in whole numbers.
+"""Motion of the nodes of a layer: a few shapes, each with a curve over time, in integers.
 
-A timeline is cut into equal intervals. A curve is a uniform cubic B-spline of them, so that it is
-smooth, can be found at any time from four coefficients, and closes where the timeline loops
-(de Boor 1978, "A Practical Guide to Splines"). A shape displaces every node; what nodes do is the
-sum of shapes times curves, as few of each say nearly all (Alexa, Mueller 2000, "Representing
-Animations by Principal Components").
+A timeline is divided into equal intervals. A curve is a uniform cubic B-spline over them (de Boor
+1978, "A Practical Guide to Splines"). So it is smooth, its value at any time depends on four
+coefficients, and it closes if the timeline loops. A shape is a displacement of every node. The
+motion is the sum of shapes times curves; a few of them describe nearly all of it (Alexa, Mueller
+2000, "Representing Animations by Principal Components").
 """
 
 from __future__ import annotations
@@ -24,37 +24,38 @@ from .pose import POINT_MAX, residuals, restored
 Ints = NDArray[np.int64]
 
 PHASE_BITS = 10
-"""An interval has 2**PHASE_BITS phases."""
+"""Base-2 logarithm of the number of phases of an interval."""
 
 MICROSECONDS = 1_000_000
 
 CURVE_BITS = 8
-"""Coefficients of curves are in 2**-CURVE_BITS."""
+"""Fractional bits of the coefficients of curves."""
 
 CURVE_MAX, SHAPE_MAX = 1 << 15, 1 << 20
-"""Coefficients of curves, and displacements of shapes, are below these."""
+"""Bounds of the magnitude of coefficients of curves, and of displacements of shapes."""
 
 MODES_MAX = 64
+"""Most shapes and curves of a layer."""
 
 _VALUE_BITS = 16
-"""Values of curves are in 2**-_VALUE_BITS."""
+"""Fractional bits of the values of curves."""
 
 _ONE = 1 << PHASE_BITS
 SUM = 6 << (3 * PHASE_BITS)
-"""What the four weights of a phase add up to."""
+"""Sum of the four weights of a phase."""
 
 
 @dataclass(frozen=True)
 class Timeline:
-    """When the layers of a picture move.
+    """Time frame of the motion of a picture.
 
     Attributes:
-        duration: Milliseconds, 1..3,600,000.
-        fps: Frames a second that it was made for, 1..240.
-        loop: Whether its end is its beginning.
-        intervals: Number of equal intervals that it is cut into.
-        unit: Shapes are multiples of 2**-unit canvas pixels.
-        script: What it was made from, as JSON (`animate.motion`), or "".
+        duration: Duration in milliseconds, 1..3,600,000.
+        fps: Frames per second for which the motion was made, 1..240; a hint.
+        loop: Whether the motion goes on at its beginning after its end.
+        intervals: Number of equal intervals that the timeline is divided into.
+        unit: Displacements of shapes are multiples of 2**-unit canvas pixels.
+        script: Motion file that the motion was made from, as JSON (`animate.motion`), or "".
     """
 
     duration: int
@@ -66,24 +67,31 @@ class Timeline:
 
     @property
     def seconds(self) -> float:
-        """The duration in seconds."""
+        """Duration in seconds."""
         return self.duration / 1000
 
     @property
     def coefficients(self) -> int:
-        """Coefficients of a curve: those of a loop go round."""
+        """Number of coefficients of a curve; those of a loop are used cyclically."""
         return self.intervals if self.loop else self.intervals + 3
 
     @property
     def frames(self) -> int:
-        """Frames at the rate that it was made for."""
+        """Number of frames at the rate `fps`."""
         return max(round(self.duration * self.fps / 1000), 1)
 
     def taps(self, seconds: float) -> tuple[Ints, Ints]:
-        """Coefficients [4] that count at a time, and their weights [4], which add up to `SUM`.
+        """Finds the coefficients that decide the value of a curve at a time.
+
+        Args:
+            seconds: Time in seconds; it is wrapped if the timeline loops, clamped otherwise.
+
+        Returns:
+            Indices int64 [4] of the coefficients, and their weights int64 [4], which add up to
+            `SUM`.
 
         Raises:
-            UsageError: The time is not a number.
+            UsageError: The time is not a finite number.
         """
         if not math.isfinite(seconds * MICROSECONDS):
             raise UsageError(f"t = {seconds} is not a time in seconds")
@@ -98,7 +106,7 @@ class Timeline:
 
 
 def weights(phase: int) -> Ints:
-    """The uniform cubic B-spline's weights [4] at a phase of 0..2**PHASE_BITS, times `SUM`."""
+    """Weights int64 [4] of a uniform cubic B-spline at a phase in 0..2**PHASE_BITS, times `SUM`."""
     f, g = phase, _ONE - phase
     one = _ONE**3
     return np.array(
@@ -114,11 +122,12 @@ def weights(phase: int) -> Ints:
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """How the nodes of a layer move over a timeline.
+    """Motion of the nodes of one layer over a timeline.
 
     Attributes:
-        curves: int64 [M, K] coefficients of M curves, in 2**-CURVE_BITS.
-        shapes: int64 [M, N, 2] displacements of all nodes in units of the timeline.
+        curves: int64 [M, K] K coefficients of each of M curves, in 2**-CURVE_BITS.
+        shapes: int64 [M, N, 2] displacements of all N nodes in each shape, in the unit of the
+            timeline.
         body: Number of the body that the layer moves with; layers of one body move as one.
     """
 
@@ -127,10 +136,17 @@ class Track:
     body: int = 0
 
     def at(self, timeline: Timeline, seconds: float) -> Ints:
-        """Displacements int64 [N, 2] in 1/1024 canvas pixel at a time; exact, half up, clamped.
+        """Displacements of all nodes at a time, in exact integer arithmetic.
+
+        Args:
+            timeline: The timeline of the picture.
+            seconds: Time in seconds; it is wrapped if the timeline loops, clamped otherwise.
+
+        Returns:
+            int64 [N, 2] in 1/1024 canvas pixel, rounded half up, at most `POINT_MAX` in magnitude.
 
         Raises:
-            UsageError: The time is not a number.
+            UsageError: The time is not a finite number.
         """
         index, weight = timeline.taps(seconds)
         total = self.curves[:, index] @ weight << (_VALUE_BITS - CURVE_BITS)
@@ -141,24 +157,37 @@ class Track:
 
 
 Coded = tuple[bytes, bytes]
-"""Classes and deltas of an array of signed integers."""
+"""Signed integers as `deltas.encode` codes them: classes and raw bits."""
 
 
 def check_size(budget: Budget, modes: int, coefficients: int, nodes: int = 0) -> None:
-    """Checks what tracks cost: all coefficients of a mode, and all nodes of the layers that move.
+    """Spends what decoding tracks costs.
+
+    Args:
+        budget: Running budget of the file.
+        modes: Number of shapes and curves of each layer.
+        coefficients: Coefficients of one curve, summed over the layers that move.
+        nodes: Nodes, summed over these layers.
 
     Raises:
-        LimitError: That exceeds `budget`.
+        LimitError: The cost exceeds `budget`.
     """
     budget.spend("wavefronts", coefficients + 2 + nodes + 2 * modes)
     budget.spend("motion", modes * (coefficients + 2 * nodes))
 
 
 def encode(tracks: list[tuple[Track, Refined]]) -> tuple[Coded, Coded]:
-    """Curves [M, layers * K] less the coefficient before; shapes [2, M, nodes] as in POSE.
+    """Encodes the tracks of all layers that move.
+
+    Args:
+        tracks: Track and refined mesh of each layer; all tracks have the same number M of modes.
+
+    Returns:
+        The coded curves [M, layers * K], each coefficient less the one before it, and the coded
+        shapes [2, M, nodes] as residuals like those of POSE.
 
     Raises:
-        LimitError: They are more than readers accept by default.
+        LimitError: The tracks are larger than readers accept by default.
     """
     coefficients = sum(track.curves.shape[1] for track, _ in tracks)
     nodes = sum(len(refined.nodes) for _, refined in tracks)
@@ -176,11 +205,23 @@ def decode(
     curves: Coded, shapes: Coded, modes: int, timeline: Timeline, meshes: list[Refined], where: str,
     budget: Budget | None = None,
 ) -> list[Track]:  # fmt: skip
-    """Inverse of `encode`.
+    """Decodes the tracks of all layers that move.
+
+    Args:
+        curves: The coded curves.
+        shapes: The coded shapes.
+        modes: Number of shapes and curves of each layer.
+        timeline: The timeline of the picture.
+        meshes: Refined mesh of each of these layers.
+        where: Name of the chunk in error messages.
+        budget: Running budget of the file; by default a new one.
+
+    Returns:
+        A track for each layer, all of body 0.
 
     Raises:
-        FormatError: Corrupt streams, or a number that is out of range.
-        LimitError: They exceed `budget`.
+        FormatError: A stream is corrupt, or a number is out of range.
+        LimitError: The tracks exceed `budget`.
     """
     coefficients = len(meshes) * timeline.coefficients
     nodes = [len(m.nodes) for m in meshes]

@@ -1,4 +1,4 @@
-"""Where a posed layer lies now, and which point of its texture each sample shows."""
+"""Warp of a posed layer: its boundary in the present place, and the texture points of samples."""
 
 from __future__ import annotations
 
@@ -20,30 +20,38 @@ Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
 
 PIECE = 4 << FRACTION_BITS
-"""Bent boundaries are divided into pieces of about 4 px."""
+"""Length of the pieces of a bent boundary, about 4 canvas pixels, in 1/1024."""
 
 PIECES_LOG2_MAX = 6
+"""Base-2 logarithm of the most pieces of a segment."""
+
 GRID_BITS = 22
-"""Extent in bits of a mesh, beyond which positions are coarsened to compute weights."""
+"""Bits of the extent of a mesh above which positions are coarsened to compute weights."""
 
 WEIGHT_BITS, WEIGHT_MAX = 16, 1 << 20
+"""Fractional bits of barycentric weights, and the bound to which they are clamped."""
+
 BATCH = 1 << 21
-"""Pairs of points and triangles handled at a time; bounds memory."""
+"""Pairs of points and triangles handled at a time, which bounds memory."""
 
 RUN = 48
-"""Control points looked up together: neighbours on a path lie in few faces."""
+"""Control points that are located together, because neighbours on a path lie in few faces."""
 
 
 def outline(
     boundary: Boundary | None, pose: Pose, mesh: Mesh | None, size: tuple[int, int]
 ) -> Boundary | None:
-    """The boundary in its present place, in 1/1024 px if it was moved; None covers everything.
+    """Brings the boundary of a layer to its present place.
 
     Args:
-        boundary: At rest; None is the canvas.
-        pose: The layer's.
-        mesh: Needed if the pose displaces nodes.
-        size: Width and height of the canvas.
+        boundary: Boundary at rest; None for the whole canvas.
+        pose: Pose of the layer.
+        mesh: Mesh of the layer; needed if the pose displaces nodes.
+        size: Width and height of the canvas in pixels.
+
+    Returns:
+        The boundary, in 1/1024 canvas pixel if the pose moves it, otherwise `boundary` itself; None
+        if the layer covers everything.
     """
     if not pose.affine and not pose.displaced:
         return boundary
@@ -61,7 +69,7 @@ def outline(
 
 @functools.lru_cache(maxsize=64)
 def _rectangle(size: tuple[int, int]) -> Boundary:
-    """The canvas as a path of four straight segments whose inner control points are its corners."""
+    """Canvas as a path of four straight segments, whose inner control points are its corners."""
     w, h = size
     corners = np.array([[0, 0], [w, 0], [w, h], [0, h]], np.int64)
     after = np.roll(corners, -1, 0)
@@ -70,7 +78,14 @@ def _rectangle(size: tuple[int, int]) -> Boundary:
 
 @dataclass(frozen=True, eq=False)
 class _Riders:
-    """Control points on a mesh: positions [n, 2], nodes [n, 3], weights [n, 3], path lengths."""
+    """Control points of a boundary that follow a mesh.
+
+    Attributes:
+        points: int64 [n, 2] positions at rest in 1/1024 canvas pixel.
+        nodes: int32 [n, 3] nodes of the face of each point.
+        weights: int64 [n, 3] barycentric weights in that face, in 2**-16.
+        lengths: Number of points of each path.
+    """
 
     points: Ints
     nodes: NDArray[np.int32]
@@ -78,7 +93,7 @@ class _Riders:
     lengths: list[int]
 
     def displacement(self, nodes: Ints) -> Ints:
-        """Displacement [n, 2] of the points for that of all nodes [N, 2], half up."""
+        """Displacements [n, 2] of the points for those [N, 2] of all nodes, rounded half up."""
         total = (self.weights[..., None] * nodes[self.nodes]).sum(1)
         rounded: Ints = (total + (1 << (WEIGHT_BITS - 1))) >> WEIGHT_BITS
         return rounded
@@ -86,7 +101,7 @@ class _Riders:
 
 @functools.lru_cache(maxsize=64)
 def _ride(boundary: Boundary, mesh: Mesh) -> _Riders:
-    """The control points of a boundary, divided into short pieces, on the faces of a mesh."""
+    """Divides a boundary into short pieces, and attaches their control points to a mesh."""
     paths = [divide(p << (FRACTION_BITS - boundary.unit)) for p in boundary.paths]
     points = np.concatenate(paths)
     refined = mesh.refined
@@ -95,10 +110,17 @@ def _ride(boundary: Boundary, mesh: Mesh) -> _Riders:
 
 
 def divide(path: Ints) -> Ints:
-    """Divides the segments of a path [3 m, 2] in 1/1024 px into 2**k pieces of equal parameter.
+    """Divides each segment of a path into 2**k pieces of equal parameter.
 
-    k is the smallest for which no coordinate of its four control points spans more than
-    `PIECE` * 2**k, at most `PIECES_LOG2_MAX`. Control points are blossoms, rounded down.
+    k is the smallest number, at most `PIECES_LOG2_MAX`, for which no coordinate of the four control
+    points of the segment spans more than `PIECE` * 2**k. The new control points are blossoms
+    (polar forms) of the curve, rounded down.
+
+    Args:
+        path: int64 [3 m, 2] control points in 1/1024 canvas pixel.
+
+    Returns:
+        int64 [3 n, 2] control points of the same path in n pieces.
     """
     p = np.stack([path[0::3], path[1::3], path[2::3], np.roll(path[0::3], -1, 0)], 1)
     span = (p.max(1) - p.min(1)).max(1)
@@ -125,10 +147,19 @@ def divide(path: Ints) -> Ints:
 def barycentric(
     points: Ints, nodes: Ints, faces: NDArray[np.int32], budget: Budget | None = None
 ) -> tuple[NDArray[np.int64], Ints]:
-    """The face [n] that holds each point, and its weights [n, 3] in 2**-16, in integers.
+    """Finds the face that holds each point, and barycentric weights, in integer arithmetic.
 
-    The first face whose three edge functions are not negative holds a point; if there is none, the
-    one whose corners' sum lies nearest to three times the point. Of equals the first.
+    A point belongs to the first face whose three edge functions are not negative. A point beyond
+    the mesh belongs to the first of the faces with the nearest centroid.
+
+    Args:
+        points: int64 [n, 2] in 1/1024 canvas pixel.
+        nodes: int64 [N, 2] in 1/1024 canvas pixel.
+        faces: int32 [F, 3] nodes of each face.
+        budget: Running budget, whose `beyond` bounds the comparisons; by default a new one.
+
+    Returns:
+        int64 [n] face of each point, and int64 [n, 3] weights in 2**-16, which add up to 2**16.
 
     Raises:
         LimitError: There are too many points and faces, or too many points beyond the mesh.
@@ -168,13 +199,13 @@ def barycentric(
 
 
 def _side(a: Ints, b: Ints, p: Ints) -> Ints:
-    """Twice the area of a, b, p."""
+    """Twice the signed area of the triangle a, b, p."""
     along, to = b - a, p - a
     return along[..., 0] * to[..., 1] - along[..., 1] * to[..., 0]
 
 
 def nearest(points: NDArray[Any], centres: NDArray[Any]) -> NDArray[np.int64]:
-    """The centre [n] nearest to each point [n, 2]; of equals the first."""
+    """Index int64 [n] of the centre [m, 2] nearest to each point [n, 2]; the first in a tie."""
     out = np.zeros(len(points), np.int64)
     per = max(BATCH // len(centres), 1)
     for start in range(0, len(points), per):
@@ -184,13 +215,13 @@ def nearest(points: NDArray[Any], centres: NDArray[Any]) -> NDArray[np.int64]:
 
 
 class Located(NamedTuple):
-    """Samples on a posed layer.
+    """Texture points of samples on a posed layer.
 
     Attributes:
-        x: float64 [n] the point of the texture that each shows, in canvas pixels.
-        y: Likewise.
-        face: int64 [n] the face it lies in, or None where no mesh was needed.
-        weights: float64 [n, 3] its barycentric weights there, or None.
+        x: float64 [n] x of the texture point of each sample, in canvas pixels at rest.
+        y: float64 [n] y of the texture point.
+        face: int64 [n] face that the sample lies in, or the nearest; None if no mesh was needed.
+        weights: float64 [n, 3] barycentric weights of the sample in that face, or None.
     """
 
     x: Floats
@@ -200,13 +231,14 @@ class Located(NamedTuple):
 
 
 class Warp:
-    """The map from the canvas to a layer's texture.
+    """Map from canvas points to texture points of a layer.
 
     Args:
-        pose: The layer's.
-        mesh: Its mesh; consulted if the pose is bent or `meshed`.
-        meshed: Whether faces are wanted in any case, and weights too.
-        budget: Bounds how often samples may be covered, and how many may lie beyond the mesh.
+        pose: Pose of the layer.
+        mesh: Mesh of the layer; only used if the pose is bent, or `meshed` is set.
+        meshed: Whether faces and barycentric weights are wanted in any case.
+        budget: Running budget of the rendering, which bounds how often the mesh covers samples, and
+            how many samples lie beyond it; by default a new one.
     """
 
     def __init__(
@@ -238,8 +270,8 @@ class Warp:
         self._second = np.stack([ac[:, 1], -ac[:, 0]], 1) / safe
         self._third = np.stack([-ab[:, 1], ab[:, 0]], 1) / safe
         to_b, to_c = offset[:, 1] - offset[:, 0], offset[:, 2] - offset[:, 0]
-        # How far from p the point lies that it shows is affine in p, in each face. As it is a
-        # distance, what did not move stays exactly where it was.
+        # In each face, the offset from a point p to its texture point is affine in p. Offsets
+        # instead of positions keep points that did not move exactly where they were.
         by_x, by_y = (
             to_b * self._second[:, k, None] + to_c * self._third[:, k, None] for k in (0, 1)
         )
@@ -255,22 +287,35 @@ class Warp:
     def faces(
         self, origin: Floats, scale: Floats, box: tuple[int, int, int, int]
     ) -> NDArray[np.int32]:
-        """The face [h, w] at each sample of a rectangle x, y, w, h of samples, or -1.
+        """Finds the face of the mesh at each sample of a rectangle.
 
         Args:
-            origin: Canvas point of sample coordinates 0, 0.
-            scale: Samples a canvas pixel, across and down.
-            box: The rectangle.
+            origin: [2] canvas point of the corner of the sample grid.
+            scale: [2] samples per canvas pixel, across and down.
+            box: Rectangle x, y, w, h in samples.
+
+        Returns:
+            int32 [h, w] numbers of faces; -1 where there is none.
 
         Raises:
-            LimitError: The mesh is folded too often.
+            LimitError: The mesh has too many faces, or is folded too often.
         """
         corners = (self._corners - origin) * scale
-        # Of a mirrored layer the faces that show are those that showed before.
+        # Mirroring reverses the orientation of faces, but must not change which one is on top.
         return rasterize(corners[:, ::-1] if self._pose.mirrored else corners, *box, self._budget)
 
     def locate(self, x: Floats, y: Floats, face: NDArray[np.int32] | None = None) -> Located:
-        """Texture points of canvas points x, y [n], whose faces [n] are given if `meshed`."""
+        """Finds the texture points of canvas points.
+
+        Args:
+            x: float64 [n] x of the points in canvas pixels.
+            y: float64 [n] y of the points.
+            face: [n] face of each point, or -1, as `faces` finds them; needed if `meshed`. A point
+                without a face belongs to the one with the nearest centroid.
+
+        Raises:
+            LimitError: Too many points lie beyond the mesh.
+        """
         if self._mesh is None:
             if not self._pose.affine:
                 return Located(x, y)

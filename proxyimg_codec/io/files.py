@@ -1,4 +1,4 @@
-"""Reading and writing whole files; a failed write never leaves half a file or loses an old one."""
+"""Reading and writing of whole files. A failed write leaves the old file, or none, never half."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from ..errors import InputError
 
 
 def read_bytes(path: str | os.PathLike[str]) -> bytes:
-    """The bytes of a file; ``-`` is standard input.
+    """Reads all bytes of a file; ``-`` is standard input.
 
     Raises:
-        InputError: It cannot be read.
+        InputError: The file cannot be read.
     """
     try:
         if os.fspath(path) == "-":
@@ -31,19 +31,21 @@ def _name(path: str | os.PathLike[str], kind: str) -> str:
 
 
 def _standard(stream: TextIO | None) -> BinaryIO:
-    """The bytes of a standard stream; Python has None where it was closed from the start."""
+    """Binary side of a standard stream; `stream` is None if it was closed when Python started."""
     if stream is None:
         raise OSError(errno.EBADF, "it is closed")
     return stream.buffer
 
 
 def write_atomically(path: str | os.PathLike[str], data: bytes) -> None:
-    """Writes a file under a temporary name in its folder and renames it.
+    """Writes a file under a temporary name in its folder, and then renames it.
 
-    A link stays a link; pipes and devices are written to directly; ``-`` is standard output.
+    A symbolic link stays a link. Pipes and devices are written to directly. ``-`` is standard
+    output.
 
     Raises:
-        InputError: It cannot be written; an old file is still there.
+        InputError: The file cannot be written; an old file of that name is unchanged.
+        BrokenPipeError: Nobody reads the pipe any more.
     """
     temporary = None
     try:

@@ -1,4 +1,4 @@
-"""Raw EXIF and XMP blocks of JPEG, PNG and WebP files, which image libraries do not hand out."""
+"""Raw EXIF and XMP blocks of JPEG, PNG and WebP files, to which image libraries give no access."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ ORIENTATION_TAG = 0x0112
 
 
 def raw_blocks(data: bytes) -> dict[str, bytes]:
-    """The ``exif`` (a TIFF structure) and ``xmp`` (XML) blocks of a picture file, if it has any.
+    """Finds the ``exif`` (a TIFF structure) and ``xmp`` (XML) blocks of a picture file, if any.
 
-    Damaged or unknown structures are passed over: metadata never stops a picture from being read.
+    Damaged or unknown structures are skipped, so that metadata never keeps a picture from being
+    read.
     """
     blocks: dict[str, bytes] = {}
     for name, block in (*_jpeg(data), *_png(data), *_webp(data)):
@@ -37,7 +38,7 @@ def _jpeg(data: bytes) -> Iterator[tuple[str, bytes]]:
 
 
 def is_cut_jpeg(data: bytes) -> bool:
-    """Whether JPEG data stops before its end marker; decoders fill the rest with grey."""
+    """Whether JPEG data ends before its end marker; decoders would fill the rest with grey."""
     at = 2
     while data[:2] == b"\xff\xd8" and at + 4 <= len(data) and data[at] == 0xFF:
         if data[at + 1] == 0xDA:
@@ -74,9 +75,9 @@ def _webp(data: bytes) -> Iterator[tuple[str, bytes]]:
 
 
 def upright(blocks: Mapping[str, bytes]) -> dict[str, bytes]:
-    """The blocks with their orientation set to 1, because the pixels have been turned.
+    """Returns the blocks with their orientation set to 1, because the pixels have been turned.
 
-    A block without the tag, or one that cannot be read, stays as it is.
+    A block without an orientation, or one that cannot be read, is returned unchanged.
     """
     change = {"exif": _upright_exif, "xmp": _upright_xmp}
     return {name: change.get(name, bytes)(block) for name, block in blocks.items()}
@@ -101,7 +102,7 @@ def _upright_exif(exif: bytes) -> bytes:
 
 
 def png_chunks(blocks: dict[str, bytes]) -> list[tuple[bytes, bytes]]:
-    """(type, body) of the PNG chunks that carry `blocks`, to be put before the pixels."""
+    """PNG chunks (type, body) that carry `blocks`; they belong before the pixel data."""
     chunks = []
     if "icc" in blocks:
         chunks.append((b"iCCP", b"ICC profile\0\0" + zlib.compress(blocks["icc"], 9)))

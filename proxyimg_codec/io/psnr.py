@@ -1,4 +1,4 @@
-"""How close two pictures are."""
+"""Peak signal-to-noise ratio of two pictures."""
 
 from __future__ import annotations
 
@@ -9,7 +9,14 @@ from numpy.typing import NDArray
 
 
 def psnr_8bit(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> float | None:
-    """PSNR in dB between 8-bit pictures [H, W, 3 or 4] with straight alpha; None if equal."""
+    """PSNR in dB of two 8-bit pictures; None if they are equal.
+
+    Opaque pictures are compared in RGB, others in premultiplied RGBA.
+
+    Args:
+        a: uint8 [H, W, 3] or, with straight alpha, [H, W, 4].
+        b: Picture of the same height and width, with 3 or 4 channels.
+    """
     opaque = all(p.shape[2] == 3 or (p[..., 3] == 255).all() for p in (a, b))
     x, y = _premultiplied(a, opaque), _premultiplied(b, opaque)
     error = float(((x - y) ** 2).mean())

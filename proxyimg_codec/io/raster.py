@@ -1,7 +1,7 @@
-"""Reading and writing ordinary picture files.
+"""Reading and writing of ordinary picture files.
 
-PNG, PPM and NPY are written here, with numpy alone; everything else, and all reading but that of
-NPY, goes through OpenImageIO.
+PNG, PPM and NPY are written, and NPY is read, with numpy alone. Everything else goes through
+OpenImageIO.
 """
 
 from __future__ import annotations
@@ -28,19 +28,20 @@ from .metadata import is_cut_jpeg, png_chunks, raw_blocks, upright
 Pixels = NDArray[Any]
 
 _PREMULTIPLIED = ("iff", "openexr", "rla")
-"""OpenImageIO types whose alpha is premultiplied by convention, and that it does not convert."""
+"""OpenImageIO types with alpha premultiplied by convention, which OpenImageIO does not convert."""
 
 _NO_FILES = ("null", "term")
-"""OpenImageIO types that are not files."""
+"""OpenImageIO types that do not stand for files."""
 
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """Pixels and metadata of a file.
+    """Pixels and metadata of a picture file.
 
     Attributes:
-        pixels: [H, W, 1..4] uint8, uint16 or float32, upright, with straight alpha.
-        blocks: Metadata ``icc``, ``exif``, ``xmp``.
+        pixels: [H, W, 1..4] uint8, uint16 or float32, upright, with straight alpha; of an NPY file
+            the array as it is, also [H, W] or of another type.
+        blocks: Metadata blocks ``icc``, ``exif``, ``xmp``.
     """
 
     pixels: Pixels
@@ -51,15 +52,23 @@ def read(path: str | os.PathLike[str]) -> Picture:
     """Reads a picture file; ``-`` is standard input. EXIF orientation is applied to the pixels.
 
     Raises:
-        InputError: Missing, empty, truncated or not a picture.
-        UnsupportedError: OpenImageIO is not installed.
+        InputError: The file is missing, empty, truncated or not a picture.
+        UnsupportedError: The type needs OpenImageIO, which is not installed.
     """
     name = "standard input" if os.fspath(path) == "-" else os.fspath(path)
     return parse(read_bytes(path), name)
 
 
 def parse(data: bytes, name: str) -> Picture:
-    """As `read`, of a picture file in memory called `name` in messages; its suffix is a hint."""
+    """Reads a picture file held in memory.
+
+    Args:
+        data: Bytes of the file.
+        name: Name of the file in error messages; its suffix is a hint of the type.
+
+    Raises:
+        InputError, UnsupportedError: As `read`.
+    """
     if not data:
         raise InputError(f"{name}: the file is empty")
     if data[:6] == b"\x93NUMPY":
@@ -94,11 +103,12 @@ def _import_oiio() -> Any:
 
 
 def _read_oiio(data: bytes, name: str) -> tuple[Pixels, bytes, int]:
-    """Pixels as stored, ICC profile and EXIF orientation of a picture file in memory."""
+    """Reads the pixels as stored, the ICC profile and the EXIF orientation of a file in memory."""
     oiio = _import_oiio()
     wanted = oiio.ImageSpec()
     wanted.attribute("oiio:UnassociatedAlpha", 1)
-    # OpenImageIO finds the reader by trying them; through a file it can try all of them.
+    # OpenImageIO finds the reader of a type by trying. All readers work on files, but not all on
+    # memory.
     with tempfile.NamedTemporaryFile(suffix=Path(name).suffix) as file, _silent_stderr():
         file.write(data)
         file.flush()
@@ -133,7 +143,7 @@ def _read_oiio(data: bytes, name: str) -> tuple[Pixels, bytes, int]:
 
 @contextlib.contextmanager
 def _silent_stderr() -> Iterator[None]:
-    """Image libraries print to the process's stderr what `geterror` says anyway."""
+    """Silences stderr of the process: image libraries print there what `geterror` says anyway."""
     try:
         saved = os.dup(2)
     except OSError:
@@ -149,7 +159,7 @@ def _silent_stderr() -> Iterator[None]:
 
 
 def _straight(pixels: Pixels) -> Pixels:
-    """Premultiplied -> straight alpha."""
+    """Converts premultiplied to straight alpha."""
     top = 1.0 if pixels.dtype.kind == "f" else float(np.iinfo(pixels.dtype).max)
     alpha = np.maximum(pixels[..., -1:].astype(np.float64) / top, 1e-12)
     colour = np.minimum(pixels[..., :-1] / alpha, top)
@@ -175,13 +185,14 @@ def write(
     blocks: Mapping[str, bytes] | None = None,
     suffix: str | None = None,
 ) -> None:
-    """Writes pixels [H, W, 3 or 4], replacing the file in one step; ``-`` is standard output.
+    """Writes a picture file, which is replaced in one step if it exists.
 
     Args:
-        path: Where to; the type follows from the suffix.
-        pixels: uint8, uint16 or float32 (NPY and OpenImageIO types only), straight alpha.
-        blocks: Metadata to carry: all of it in PNG, the ICC profile in other types that take one.
-        suffix: The type, if `path` has no suffix, such as ``.png``.
+        path: Path of the file, whose suffix decides the type; ``-`` is standard output.
+        pixels: [H, W, 3] or, with straight alpha, [H, W, 4]; uint8, uint16, or float32 (only for
+            NPY and types of OpenImageIO).
+        blocks: Metadata to carry: all of it in PNG, the ICC profile in types of OpenImageIO.
+        suffix: Type of the file in place of the suffix of `path`, such as ``.png``.
 
     Raises:
         InputError: The file cannot be written.
@@ -203,12 +214,20 @@ def write(
 
 
 def encode_png(pixels: Pixels, blocks: dict[str, bytes] | None = None) -> bytes:
-    """A PNG file of uint8 or uint16 pixels [H, W, 3 or 4]."""
+    """Encodes pixels as a PNG file.
+
+    Args:
+        pixels: uint8 or uint16 [H, W, 3] or, with straight alpha, [H, W, 4].
+        blocks: Metadata blocks ``icc``, ``exif``, ``xmp`` to carry.
+
+    Raises:
+        UsageError: The pixels have another type.
+    """
     if pixels.dtype not in (np.uint8, np.uint16):
         raise UsageError("PNG holds 8 or 16 bits a sample, not floating point")
     height, width, channels = pixels.shape
     rows = pixels.astype(pixels.dtype.newbyteorder(">")).reshape(height, -1).view(np.uint8)
-    # The Up filter: cheap, and good on smooth pictures.
+    # Filter type 2 of PNG, Up: cheap, and good on smooth pictures.
     filtered = np.full((height, rows.shape[1] + 1), 2, np.uint8)
     filtered[:, 1:] = np.diff(rows, axis=0, prepend=np.zeros_like(rows[:1]))
     header = struct.pack(
@@ -228,7 +247,11 @@ def encode_png(pixels: Pixels, blocks: dict[str, bytes] | None = None) -> bytes:
 
 
 def encode_ppm(pixels: Pixels) -> bytes:
-    """A binary PPM file of uint8 or uint16 pixels [H, W, 3]."""
+    """Encodes uint8 or uint16 pixels [H, W, 3] as a binary PPM file.
+
+    Raises:
+        UsageError: The pixels have another type, or alpha.
+    """
     if pixels.dtype not in (np.uint8, np.uint16):
         raise UsageError("PPM holds 8 or 16 bits a sample, not floating point")
     if pixels.shape[2] != 3:
@@ -263,7 +286,7 @@ def _encode_oiio(kind: str, pixels: Pixels, blocks: dict[str, bytes]) -> bytes:
         if good and _loses_bits(formats[str(pixels.dtype)], str(target.spec().format)):
             raise UsageError(f"{kind} holds fewer bits a sample than asked for; write PNG or TIFF")
         good = good and target.write_image(np.ascontiguousarray(pixels)) and target.close()
-        # Some writers report success and leave a stump.
+        # Some writers report success and leave a truncated file.
         if not good or oiio.ImageInput.open(name) is None:
             problem = f"{target.geterror()}\n{oiio.geterror()}".strip() or "unknown reason"
             problem = problem.splitlines()[0]
@@ -276,7 +299,7 @@ def _loses_bits(wanted: str, got: str) -> bool:
 
 
 def _associated(pixels: Pixels) -> Pixels:
-    """Straight -> premultiplied alpha."""
+    """Converts straight to premultiplied alpha."""
     top = 1.0 if pixels.dtype.kind == "f" else float(np.iinfo(pixels.dtype).max)
     colour = pixels[..., :-1] * (pixels[..., -1:] / top)
     if pixels.dtype.kind != "f":

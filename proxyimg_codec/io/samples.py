@@ -1,4 +1,4 @@
-"""Arrays of samples as the pictures that they stand for."""
+"""Conversion of sample arrays of any accepted type to one form."""
 
 from __future__ import annotations
 
@@ -13,10 +13,17 @@ Floats = NDArray[np.float32]
 
 
 def to_float(pixels: NDArray[Any]) -> tuple[Floats, int]:
-    """A picture as float32 [H, W, 4] with straight alpha in 0..1, and its depth, 8 or 16.
+    """Converts a picture to floating-point RGBA.
+
+    Args:
+        pixels: [H, W] grey, or [H, W, C] with C = 1 for grey, 2 for grey and alpha, 3 for RGB, 4
+            for RGB and alpha; alpha is straight; uint8, uint16, or floating point in 0..1.
+
+    Returns:
+        float32 [H, W, 4] with straight alpha in 0..1, and the depth in bits: 8 for uint8, else 16.
 
     Raises:
-        InputError: Wrong shape or type, empty, not finite, or outside 0..1.
+        InputError: The array has a wrong shape or type, is empty, not finite, or outside 0..1.
     """
     if pixels.ndim == 2:
         pixels = pixels[..., None]

@@ -1,4 +1,4 @@
-"""XML from strangers: no document type, so no entities; bounded in size and depth."""
+"""Safe parsing of untrusted XML: no document type, so no entities; bounded size and depth."""
 
 from __future__ import annotations
 
@@ -16,11 +16,16 @@ _NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 def parse(data: bytes, name: str) -> ElementTree.Element:
-    """The root element of an XML document called `name` in messages.
+    """Parses an XML document, and returns its root element.
+
+    Args:
+        data: The document.
+        name: Name of the document in error messages.
 
     Raises:
-        InputError: Not well-formed XML, a DOCTYPE, or nested deeper than `DEPTH_MAX`.
-        LimitError: Larger than `BYTES_MAX`.
+        InputError: The document is not well-formed, has a DOCTYPE, or is nested deeper than
+            `DEPTH_MAX`.
+        LimitError: The document is larger than `BYTES_MAX`.
     """
     if len(data) > BYTES_MAX:
         raise LimitError(f"{name}: {len(data)} bytes of XML exceed the limit of {BYTES_MAX}")
@@ -50,12 +55,12 @@ def parse(data: bytes, name: str) -> ElementTree.Element:
 
 
 def text(value: str) -> str:
-    """`value` with every character that XML cannot hold replaced by U+FFFD."""
+    """Returns `value` with every character that XML cannot hold replaced by U+FFFD."""
     return _NOT_XML.sub("\ufffd", value)
 
 
 def serialize(root: ElementTree.Element) -> bytes:
-    """The document of `root`, indented."""
+    """Returns the document of `root` in UTF-8, indented."""
     ElementTree.indent(root, " ")
     document: bytes = ElementTree.tostring(root, "utf-8", xml_declaration=True)
     return document + b"\n"

@@ -1,1 +1,1 @@
-"""Registered models: weights, and cards that say where they come from."""
+"""Registered models: files of weights, with a card for each that states its origin."""

@@ -1,8 +1,11 @@
-"""The compiled kernel (`kernel.cpp`) behind ctypes.
+"""Binding of the compiled kernel (`kernel.cpp`) by ctypes.
 
-Functions that take a structure of one module alone are called there: `texture.context_native`,
-`texture.synthesis_native`, `encoder.implicit.fit_native`. The kernel is optional: `available()`
-is false where the package was installed without a C++ compiler.
+A kernel function whose structure only one module needs is called in that module:
+`texture.context_native`, `texture.synthesis_native`, `encoder.implicit.fit_native`. The kernel is
+optional: `available()` is False if the package was installed without a C++ compiler.
+
+Arrays must be contiguous and have the stated type, unless a function says otherwise: the kernel
+gets their addresses. Every function here needs the kernel to be available.
 """
 
 from __future__ import annotations
@@ -27,13 +30,13 @@ class Net(ct.Structure):
 
 
 class Entries(ct.Structure):
-    """Bilinear taps of every entry; mirrors `struct Entries`."""
+    """Bilinear taps of N points; mirrors `struct Entries`."""
 
     _fields_ = [(n, ct.c_void_p) for n in ("base", "stride", "fx", "fy")]
 
 
 class Coded(ct.Structure):
-    """A coded array; mirrors `struct Coded`."""
+    """Coded array to decode; mirrors `struct Coded`."""
 
     _fields_ = [
         ("words", ct.c_void_p),
@@ -48,13 +51,13 @@ class Coded(ct.Structure):
 
 
 class Points(ct.Structure):
-    """Mirrors `struct Points`."""
+    """Points at which samples are interpolated; mirrors `struct Points`."""
 
     _fields_ = [*((n, ct.c_void_p) for n in ("first", "fx", "fy")), ("n", ct.c_int64)]
 
 
 class Cover(ct.Structure):
-    """What covers a rectangle of pixels; mirrors `struct Cover`."""
+    """Rectangle of pixels whose coverage is computed; mirrors `struct Cover`."""
 
     _fields_ = [
         *((n, ct.c_int64) for n in ("width", "height", "work", "most")),
@@ -77,14 +80,14 @@ _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "pxi_blend": (None, [*(_ADDRESS,) * 4, _LONG]),
     "pxi_train": (ct.c_double, [*(_ADDRESS,) * 2, *(_LONG,) * 3, *(_ADDRESS,) * 2]),
 }  # fmt: skip
-"""Result and arguments of each function; a structure of another module is an address here."""
+"""Types of result and arguments of each function; structures of other modules are addresses."""
 
 
 @functools.cache
 def library() -> ct.CDLL | None:
-    """The loaded kernel, or None where it was not built or does not load on this machine.
+    """Loads the kernel; None if it was not built or does not load on this machine.
 
-    The environment variable PROXYIMG_NO_KERNEL switches it off: then all is numpy and torch.
+    The environment variable PROXYIMG_NO_KERNEL switches it off; then numpy and torch do its work.
     """
     if os.environ.get("PROXYIMG_NO_KERNEL"):
         return None
@@ -112,7 +115,11 @@ def available() -> bool:
 
 
 def pointer(array: NDArray[Any]) -> int:
-    """Address of a contiguous array, for a `c_void_p` field; the caller keeps the array alive."""
+    """Address of an array for a `c_void_p` field; the caller has to keep the array alive.
+
+    Raises:
+        ValueError: The array is not contiguous.
+    """
     if not array.flags.c_contiguous:
         raise ValueError("the kernel takes contiguous arrays only")
     return array.ctypes.data
@@ -127,16 +134,20 @@ def forward(
     fx: NDArray[np.float32],
     fy: NDArray[np.float32],
 ) -> NDArray[np.float32]:
-    """Network outputs [N, channels] of N entries with taps base [N], stride [N], fx, fy [N].
+    """Interpolates codes at N points, and runs the decoder network on them.
 
     Args:
         net: Shape of the network.
         codes: [rows, dim] dequantized codes.
-        weights: Flat parameters, per layer [out][in] rows and then the biases.
-        base: Row of each entry's upper left code.
-        stride: Distance in rows to the code below.
-        fx: Horizontal fraction in 0..1.
-        fy: Vertical fraction in 0..1.
+        weights: All parameters in one dimension: for each layer its weights [out, in], then its
+            biases [out].
+        base: [N] row in `codes` of the upper left code of each point.
+        stride: [N] number of rows from a code to the code below.
+        fx: [N] horizontal fractions in 0..1.
+        fy: [N] vertical fractions in 0..1.
+
+    Returns:
+        float32 [N, channels] outputs, not clamped.
     """
     lib = library()
     assert lib is not None, "check available() first"
@@ -154,13 +165,17 @@ def sample(
     fx: NDArray[np.float32],
     fy: NDArray[np.float32],
 ) -> NDArray[np.float32]:
-    """Interpolates at points, as `texture.pyramid` does in numpy: [N, C].
+    """Interpolates samples at N points, as `texture.pyramid` does in numpy.
 
     Args:
-        samples: [h, w, C], C being 3 or 4.
-        first: Number of the sample up and left of the four by four that count, of each point [N].
-        fx: Horizontal fractions [N] in 0..1.
-        fy: Vertical fractions.
+        samples: [h, w, C] samples, C = 3 or 4.
+        first: [N] number (row * w + column) of the upper left one of the 4x4 samples that a point
+            is interpolated from.
+        fx: [N] horizontal fractions in 0..1.
+        fy: [N] vertical fractions in 0..1.
+
+    Returns:
+        float32 [N, C] interpolated samples.
     """
     lib = library()
     assert lib is not None, "check available() first"
@@ -177,13 +192,16 @@ def blend(
     colour: NDArray[np.float32],
     coverage: NDArray[np.float32] | None,
 ) -> None:
-    """Puts colours behind what is there, as `render.compose` does in numpy.
+    """Composites a layer behind the layers drawn so far, as `render.compose` does in numpy.
 
     Args:
-        result: [N, 4] premultiplied colour and alpha; what is there.
-        clear: [N] what that lets through.
-        colour: [N, 4] premultiplied.
-        coverage: [N] in 0..1, or None for 1.
+        result: float32 [N, 4] premultiplied colour and alpha so far; changed in place.
+        clear: float32 [N] share of light that still passes, 0..1; changed in place.
+        colour: float32 [N, 4] premultiplied colour and alpha of the layer.
+        coverage: float32 [N] coverage of the layer in 0..1; None for 1 everywhere.
+
+    Raises:
+        ValueError: An array is not float32, or not contiguous.
     """
     lib = library()
     assert lib is not None, "check available() first"
@@ -197,18 +215,19 @@ def blend(
 def coverage(
     segments: NDArray[np.int64], log2: NDArray[np.int64], width: int, height: int, most: int
 ) -> tuple[NDArray[np.int32], int]:
-    """Coverage [height, width] of pixels, as `geometry.coverage` computes it in numpy.
+    """Computes the coverage of pixels, as `geometry.coverage` does in numpy.
 
     Args:
-        segments: Control points [m, 4, 2] in 1/256 pixel.
-        log2: Into how many chords each is divided, as a power of two.
-        width: Columns.
-        height: Rows.
-        most: Pieces of chords, in rows and in pixels, after which it stops.
+        segments: [m, 4, 2] control points of Bézier segments in 1/256 pixel, relative to the upper
+            left corner; need not be contiguous.
+        log2: [m] base-2 logarithm of the number of chords of each segment.
+        width: Number of columns.
+        height: Number of rows.
+        most: Most pieces of chords, in rows and in pixels; beyond it the computation stops.
 
     Returns:
-        The coverage, and the number of pieces; with more than `most` of these, the coverage is not
-        complete.
+        int32 [height, width] coverage in 0..`geometry.coverage.FULL`, and the number of pieces; if
+        that exceeds `most`, the coverage is incomplete.
     """
     lib = library()
     assert lib is not None, "check available() first"
@@ -224,21 +243,22 @@ def decode(
     known: NDArray[np.int16], y: NDArray[np.int32], x: NDArray[np.int32],
     bounds: NDArray[np.int64], alphabet: int, adaptation: tuple[int, int, int],
 ) -> int:  # fmt: skip
-    """Decodes symbols into `known` [H + 1, W + 2, C], as `entropy.arrays` does in numpy.
+    """Decodes the symbols of an adaptively coded array, as `entropy.arrays` does in numpy.
 
     Args:
-        words: The stream, from its first word on.
-        states: One of each lane; they move on.
-        scale_bits: Frequencies sum to 2**scale_bits.
-        known: -1 everywhere.
-        y: Rows of the positions, in coding order.
-        x: Columns.
-        bounds: First position of each wavefront, and the end.
+        words: Words of the stream.
+        states: State of each lane; changed in place.
+        scale_bits: Frequencies add up to 2**scale_bits.
+        known: [H + 1, W + 2, C] filled with -1; the symbols of position y, x are written to
+            [y + 1, x + 1].
+        y: [N] rows of the positions, in coding order.
+        x: [N] columns of the positions.
+        bounds: Index of the first position of each wavefront, and N.
         alphabet: Number of symbols.
         adaptation: Initial count, increment and limit of the counts.
 
     Returns:
-        How many words were used.
+        Number of words used.
 
     Raises:
         FormatError: The stream ends too early.
@@ -261,14 +281,17 @@ def rans_encode(
     start: NDArray[np.uint16], freq: NDArray[np.uint16], ends: NDArray[np.int64],
     scale_bits: int, states: NDArray[np.uint32],
 ) -> NDArray[np.uint16]:  # fmt: skip
-    """Words of the stream of symbols [N], as `entropy.rans` makes them in numpy.
+    """Encodes N symbols with interleaved rANS, as `entropy.rans` does in numpy.
 
     Args:
-        start: Cumulative frequencies before the symbols.
-        freq: Their frequencies.
+        start: [N] cumulative frequency before each symbol.
+        freq: [N] frequency of each symbol.
         ends: Number of symbols up to the end of each group.
-        scale_bits: Frequencies sum to 2**scale_bits.
-        states: A power of two of states at their start; they move on.
+        scale_bits: Frequencies add up to 2**scale_bits.
+        states: Initial state of each lane; changed in place. The number of lanes is a power of two.
+
+    Returns:
+        uint16 words of the stream.
     """
     lib = library()
     assert lib is not None, "check available() first"

@@ -1,6 +1,6 @@
-"""Parts that can be added by other packages, found by name.
+"""Plug-ins: functions that are found by name, and that other packages can add.
 
-A package offers a part as an entry point in the group ``proxyimg_codec.KIND``:
+A package offers a plug-in as an entry point in the group ``proxyimg_codec.KIND``:
 
     [project.entry-points."proxyimg_codec.segmenters"]
     mine = "my_package:segment"
@@ -28,20 +28,21 @@ BUILT_IN = {
     },
     "engines": {"ort": "proxyimg_codec.export.onnx_engine:run"},
 }
-"""Parts of this package: kind, name, and where the object is."""
+"""Plug-ins of this package: ``module:attribute`` by kind and name."""
 
 
 def names(kind: str) -> list[str]:
-    """Names of all parts of a kind, built-in ones first."""
+    """Names of all plug-ins of a kind, built-in ones first."""
     added = {e.name for e in entry_points(group=f"proxyimg_codec.{kind}")}
     return [*BUILT_IN[kind], *sorted(added - set(BUILT_IN[kind]))]
 
 
 def find(kind: str, name: str) -> Any:
-    """The part of a kind with a name; built-in ones cannot be replaced.
+    """Loads the plug-in of a kind and name; built-in ones cannot be replaced.
 
     Raises:
-        UsageError: There is no such part.
+        UsageError: There is no such plug-in.
+        ImportError: A package that the plug-in needs is not installed.
     """
     if name in BUILT_IN[kind]:
         module, _, attribute = BUILT_IN[kind][name].partition(":")

@@ -1,1 +1,1 @@
-"""Rendering: from layers to pixels at any size and region."""
+"""Rendering of layers to pixels, at any size and of any region."""

@@ -1,4 +1,4 @@
-"""Colours that were computed before, so that an edit costs only what it changed."""
+"""Cache of computed colours, so that rendering after an edit only computes what has changed."""
 
 from __future__ import annotations
 
@@ -10,22 +10,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 BYTES_MAX = 1 << 27
-"""Memory of a cache; what was not used for longest goes first."""
+"""Most bytes of the colours in a cache; the least recently used go first."""
 
 SAMPLES_MAX = 1 << 21
-"""Larger views are not cached: they would only push each other out."""
+"""Most samples of a view that is cached: the tiles of a larger one would displace each other."""
 
 
 class Sheet:
-    """One layer on one rectangle of samples: the rows that it may cover.
+    """Coverage and colours of one layer on the rows of a rectangle of samples that it may cover.
+
+    Samples are numbered row by row in the rectangle.
 
     Attributes:
-        coverage: float32 [stop - start] in 0..1, or None for a layer that covers everything.
-        start: First sample, in rows of the rectangle.
-        stop: The sample after the last.
-        known: bool [stop - start] where `colour` is computed.
-        colour: float32 [stop - start, 4] premultiplied, before opacity and the colour matrix; 0
-            where not known.
+        coverage: float32 [stop - start] in 0..1; None for a layer that covers everything.
+        start: Number of the first sample.
+        stop: Number of the sample after the last.
+        known: bool [stop - start], True where `colour` is computed.
+        colour: float32 [stop - start, 4] premultiplied colour and alpha, before opacity and the
+            colour matrix; 0 where it is not known.
     """
 
     def __init__(self, coverage: NDArray[np.float32] | None, start: int, stop: int) -> None:
@@ -35,7 +37,7 @@ class Sheet:
 
 
 class Cache:
-    """The sheets of an image and of those made from it by edits, by what they depend on."""
+    """Sheets of an image and its edited copies; a key holds everything that a sheet depends on."""
 
     def __init__(self) -> None:
         self._sheets: OrderedDict[Hashable, Sheet] = OrderedDict()
@@ -43,7 +45,7 @@ class Cache:
         self._lock = threading.Lock()
 
     def get(self, key: Hashable) -> Sheet | None:
-        """The sheet of a key."""
+        """Returns the sheet of a key, or None."""
         with self._lock:
             sheet = self._sheets.get(key)
             if sheet is not None:
@@ -51,7 +53,7 @@ class Cache:
             return sheet
 
     def put(self, key: Hashable, sheet: Sheet) -> None:
-        """Keeps a sheet, and forgets others if there is too much."""
+        """Stores a sheet, and drops the least recently used ones above `BYTES_MAX`."""
         with self._lock:
             if key not in self._sheets:
                 self._bytes += sheet.colour.nbytes
@@ -60,7 +62,7 @@ class Cache:
                 self._bytes -= self._sheets.popitem(last=False)[1].colour.nbytes
 
     def clear(self) -> None:
-        """Forgets everything."""
+        """Drops all sheets."""
         with self._lock:
             self._sheets.clear()
             self._bytes = 0

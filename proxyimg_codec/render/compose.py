@@ -25,10 +25,10 @@ from .neighbours import moved_neighbours, present_outline
 from .view import View
 
 TILE_SAMPLES = 1 << 16
-"""Samples rendered at a time: bounds the memory of any output, and keeps it in the cache."""
+"""Samples rendered at a time: bounds memory for any output, and keeps it in the processor cache."""
 
 ANCHOR_COST_BITS = 7
-"""A feature at an anchor counts as 2**ANCHOR_COST_BITS multiplications, for each sample."""
+"""Cost of a feature at an anchor, for each sample: 2**ANCHOR_COST_BITS multiplications."""
 
 Rectangle = tuple[int, int, int, int]
 
@@ -42,19 +42,23 @@ def compose(
     limits: Limits = DEFAULT_LIMITS,
     cache: Cache | None = None,
 ) -> None:
-    """Draws `layers` (back to front) and hands finished tiles to `out`.
+    """Draws layers, and hands finished tiles to a function.
 
     Args:
-        picture: What the layers belong to.
+        picture: Picture that the layers belong to.
         view: Output size and region.
-        layers: What to draw.
-        engine: Name of who runs the networks.
-        out: Called with row, column and float32 [h, w, 4] premultiplied colour and alpha in 0..1.
-        limits: Bounds what it costs.
-        cache: Colours that were computed before.
+        layers: Layers to draw, back to front.
+        engine: Name of the engine that runs the decoder networks.
+        out: Called for each tile with row and column of its first output pixel, and float32
+            [h, w, 4] premultiplied colour and alpha in 0..1.
+        limits: Bounds on the work.
+        cache: Colours computed before; this call adds to them.
 
     Raises:
-        LimitError: It would cost more.
+        UsageError: The engine is unknown.
+        UnsupportedError: The engine is not installed.
+        LimitError: The work would exceed `limits`.
+        FormatError: A coded stream that is decoded only now is corrupt.
     """
     sx, sy = view.supersampling
     budget, cache = Budget(limits), cache or Cache()
@@ -74,7 +78,7 @@ def compose(
 
 
 def _tile(painters: Sequence[_Painter], box: Rectangle) -> Floats:
-    """Samples [h, w, 4], premultiplied, of the sample rectangle `box` = x, y, w, h."""
+    """Renders premultiplied samples [h, w, 4] of a rectangle `box` = x, y, w, h of samples."""
     _, _, w, h = box
     result = np.zeros((h * w, 4), np.float32)
     clear = np.ones(h * w, np.float32)
@@ -96,7 +100,7 @@ def _tile(painters: Sequence[_Painter], box: Rectangle) -> Floats:
 
 
 class _Painter:
-    """One layer on the sample grid of one view."""
+    """Renderer of one layer on the sample grid of one view."""
 
     def __init__(
         self, picture: Picture, layer: Layer, view: View, engine: str, budget: Budget, cache: Cache
@@ -112,11 +116,11 @@ class _Painter:
         self._warp = Warp(layer.pose, layer.mesh, layer.sampling in (1, 2), budget)
         sx, sy = view.supersampling
         small = view.width * sx * view.height * sy <= SAMPLES_MAX
-        # A moment of a motion is drawn once; keeping it would only push out what stays.
+        # A moment of a motion is drawn only once. Caching it would displace sheets of still layers.
         self._caching = small and layer.pose.sway is None
 
     def sheet(self, box: Rectangle) -> Sheet:
-        """The layer on a rectangle of samples: its coverage, and the colours known so far."""
+        """Returns the sheet of a rectangle x, y, w, h of samples, with the colours known so far."""
         key = self._key(box)
         found = self._cache.get(key) if self._caching else None
         if found is None:
@@ -136,7 +140,7 @@ class _Painter:
         return Sheet(share, first * w, last * w)
 
     def _key(self, box: Rectangle) -> Hashable:
-        """All that coverage and colour depend on. Models are immutable, so identity will do."""
+        """Key of everything that a sheet depends on; parts of the immutable model by identity."""
         layer, pose = self._layer, self._layer.pose
         arrays = tuple(None if v is None else v.tobytes() for v in (pose.nodes, pose.places))
         return (
@@ -146,13 +150,13 @@ class _Painter:
         )  # fmt: skip
 
     def paint(self, sheet: Sheet, box: Rectangle, at: NDArray[np.int64]) -> None:
-        """Computes the colours of the samples `at` of a sheet."""
+        """Computes colours of samples of a sheet; `at` are their numbers, from `sheet.start` on."""
         everything = len(at) == len(sheet.known)
         sheet.colour[slice(None) if everything else at] = self._textured(box, at + sheet.start)
         sheet.known[at] = True
 
     def posed(self, colour: Floats) -> Floats:
-        """Premultiplied colour [n, 4] as the pose shows it."""
+        """Applies the colour matrix and the opacity of the pose to premultiplied colours [n, 4]."""
         pose = self._layer.pose
         if pose.colour:
             matrix = np.array(pose.colour, np.float32).reshape(3, 4) / (1 << COLOUR_BITS)
@@ -166,7 +170,7 @@ class _Painter:
         return colour
 
     def _textured(self, box: Rectangle, at: NDArray[np.int64]) -> Floats:
-        """Premultiplied texture colour [n, 4] of the samples `at` of a rectangle."""
+        """Premultiplied texture colours [n, 4] of the samples numbered `at` [n] of a rectangle."""
         x0, y0, w, h = box
         xs, ys = self._view.columns(x0, x0 + w), self._view.rows(y0, y0 + h)
         x, y = xs[at % w], ys[at // w]
@@ -195,7 +199,15 @@ class _Painter:
 
 
 def outline(boundary: Boundary | None, view: View) -> list[NDArray[np.int64]] | None:
-    """The paths on the sample grid of `view`, in 1/256 sample; None covers everything."""
+    """Paths of a boundary on the sample grid of a view.
+
+    Args:
+        boundary: Boundary in its present place; None for the whole canvas.
+        view: The view.
+
+    Returns:
+        For each path int64 [3 m, 2] control points in 1/256 sample; None for the whole canvas.
+    """
     if boundary is None:
         return None
     sx, sy = view.supersampling
@@ -215,7 +227,7 @@ def outline(boundary: Boundary | None, view: View) -> list[NDArray[np.int64]] | 
 def _at_nodes(
     picture: Picture, layer: Layer, texture: ImplicitTexture, network: Network, shown: Located
 ) -> Floats:
-    """Network outputs [n, channels] of a layer with node sampling."""
+    """Network outputs float32 [n, channels] of a layer with node sampling."""
     refined = layer.mesh.refined if layer.mesh else None
     nodes = np.zeros((1, 2)) if refined is None else refined.nodes / (1 << FRACTION_BITS)
     faces = np.zeros((1, 3), np.int32) if refined is None else refined.faces
@@ -231,14 +243,18 @@ def _at_nodes(
 
 
 def premultiplied(output: Floats) -> Floats:
-    """Texture colours [N, 3 or 4] clamped to valid premultiplied colour and alpha [N, 4].
+    """Clamps outputs of a texture to valid premultiplied colour and alpha.
 
-    Outputs that are not numbers count as 0. Colour is in 0..1; with a fourth output alpha is in
-    0..1 and colour in 0..alpha.
+    Args:
+        output: float32 [N, 3] colour, or [N, 4] premultiplied colour and alpha; a NaN counts as 0.
+
+    Returns:
+        float32 [N, 4] with alpha in 0..1, which is 1 without a fourth output, and colour in
+        0..alpha.
     """
     result = np.empty((len(output), 4), np.float32)
     result[:, 3] = np.fmin(np.fmax(output[:, 3], 0), 1) if output.shape[1] == 4 else 1
     for k in range(3):
-        # Unlike clip, fmax takes the number where the other is none.
+        # Unlike clip, fmax of a NaN and a number is the number.
         np.fmin(np.fmax(output[:, k], 0), result[:, 3], out=result[:, k])
     return result

@@ -1,7 +1,7 @@
-"""Engines: who runs the decoder network. All give the same colours within rounding.
+"""Engines that run the decoder network. All give the same colours but for rounding.
 
-An engine is a function from (texture, network, taps) to float32 [N, channels]; `numpy` is the
-readable reference that the others are judged by.
+An engine is a function from (texture, network, taps) to float32 [N, channels]. The engine `numpy`
+is the readable reference with which the others have to agree.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from ..texture.network import Floats, Network
 Engine = Callable[[ImplicitTexture, Network, Taps], Floats]
 
 _CHUNK = 4096
-"""Points at a time: the encoded features then stay in the cache."""
+"""Points computed at a time, few enough for their features to stay in the processor cache."""
 
 
 def run_numpy(texture: ImplicitTexture, network: Network, taps: Taps) -> Floats:
-    """Plain numpy."""
+    """Runs the network in numpy, with outputs float32 [N, channels] for taps of N points."""
     out = np.empty((len(taps.base), network.shape.channels), np.float32)
     for at, part in in_chunks(taps):
         out[at] = network(texture.features(part))
@@ -32,7 +32,7 @@ def run_numpy(texture: ImplicitTexture, network: Network, taps: Taps) -> Floats:
 
 
 def run_native(texture: ImplicitTexture, network: Network, taps: Taps) -> Floats:
-    """The compiled kernel."""
+    """Runs the network in the compiled kernel; arguments and result are those of `run_numpy`."""
     shape, weights = _flat(network)
     stride = np.full(len(taps.base), taps.stride, np.int32)
     return kernel.forward(shape, texture.table, weights, taps.base, stride, taps.fx, taps.fy)
@@ -46,7 +46,7 @@ def _flat(network: Network) -> tuple[kernel.Net, Floats]:
 
 
 def run_features(network: Network, features: Floats) -> Floats:
-    """Outputs [N, channels] for features [N, D] that do not come from taps, in plain numpy."""
+    """Outputs float32 [N, channels] for given features float32 [N, D], computed in numpy."""
     out = np.empty((len(features), network.shape.channels), np.float32)
     for i in range(0, len(out), _CHUNK):
         at = slice(i, i + _CHUNK)
@@ -55,22 +55,25 @@ def run_features(network: Network, features: Floats) -> Floats:
 
 
 def in_chunks(taps: Taps) -> Iterator[tuple[slice, Taps]]:
-    """Parts of taps that are run at a time, and where in the output they belong."""
+    """Divides taps into chunks for the processor cache, each with its place in the output."""
     for i in range(0, len(taps.base), _CHUNK):
         at = slice(i, i + _CHUNK)
         yield at, Taps(taps.base[at], taps.fx[at], taps.fy[at], taps.stride)
 
 
 BUILT_IN: dict[str, Engine] = {"numpy": run_numpy, "native": run_native}
-"""Engines that need nothing else; others are plug-ins (`plugins`)."""
+"""Engines that need no other package; further ones are plug-ins (`plugins`)."""
 
 
 def find(name: str) -> Engine:
-    """The engine called `name`; ``auto`` is ``native`` where it was built, else ``numpy``.
+    """Finds an engine by name.
+
+    Args:
+        name: Name of the engine; ``auto`` is ``native`` if the kernel is available, else ``numpy``.
 
     Raises:
-        UsageError: No such engine.
-        UnsupportedError: It is not installed.
+        UsageError: There is no engine of that name.
+        UnsupportedError: The engine is not installed.
     """
     if name == "auto":
         name = "native" if kernel.available() else "numpy"

@@ -1,4 +1,4 @@
-"""A picture that moves, at a moment of its timeline."""
+"""Still picture of a moment of a motion."""
 
 from __future__ import annotations
 
@@ -9,12 +9,15 @@ from ..model import Layer, Layers, Picture
 
 
 def at(picture: Picture, t: float) -> Picture:
-    """The still that a picture that moves is at a time in seconds.
+    """Returns one moment of an animated picture as a still picture without history.
 
-    Before and after its timeline a picture stays as it is at its ends, unless it loops.
+    Args:
+        picture: The picture with a timeline.
+        t: Time in seconds. A timeline that loops repeats; otherwise a time before its start or
+            after its end counts as its start or end.
 
     Raises:
-        UsageError: The picture has no timeline, or the time is not a number.
+        UsageError: The picture has no timeline, or `t` is not a finite number.
     """
     line = picture.timeline
     if line is None:

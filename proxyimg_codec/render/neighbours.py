@@ -1,7 +1,8 @@
-"""How layers lie beside those that their textures were cut against, once edits have moved some.
+"""Neighbours of a layer that have moved since its texture was cut [PYR-46].
 
-A view of planes knows the boundaries that took samples from it when it was made (`texture.cuts`).
-Where such a boundary has moved away or gone, samples that were mixed with it no longer fit.
+The layers of a pyramid picture are views of one raster. A view knows the boundaries that cut it
+when it was made (`texture.cuts`). The raster samples on such a boundary are mixtures of the colours
+on both sides. They no longer fit once an edit has moved the boundary away or removed its layer.
 """
 
 from __future__ import annotations
@@ -18,19 +19,26 @@ from ..texture.pyramid import PyramidTexture, Texture
 
 
 def present_outline(picture: Picture, layer: Layer) -> Boundary | None:
-    """The boundary of one of its layers in its present place; None for the whole canvas."""
+    """Boundary of a layer of `picture` in its present place; None for the whole canvas."""
     return outline(layer.boundary, layer.pose, layer.mesh, picture.size)
 
 
 def moved_neighbours(picture: Picture, layer: Layer) -> Moved:
-    """What no longer lies to a layer as it did when the samples of its view were mixed."""
+    """Finds what has moved relative to a layer since its view was cut; see `Moved`."""
     layers = picture.layers
     home = next(k for k, v in enumerate(layers) if v.texture is layer.texture)
     return _moved(layer.texture, layer.pose, layers, home)
 
 
 def _moved(view: Texture, pose: Pose, layers: Sequence[Layer], home: int) -> Moved:
-    """What has moved away from a view, cut for layer `home`, that a layer in a pose shows."""
+    """Finds what has moved relative to a layer that shows a view.
+
+    Args:
+        view: Texture of the layer.
+        pose: Pose of the layer.
+        layers: All layers, back to front.
+        home: Number of the layer for which the view was cut, the first one that shows it.
+    """
     if not isinstance(view, PyramidTexture) or view.cuts is None:
         return ALL_IN_PLACE
     boundaries = [v.boundary for v in layers]
@@ -42,7 +50,11 @@ def _moved(view: Texture, pose: Pose, layers: Sequence[Layer], home: int) -> Mov
 
 
 def settled(layers: Sequence[Layer]) -> list[Layer]:
-    """Layers whose views have a mask for each boundary that cut them and is gone."""
+    """Replaces cuts that a file cannot express by masks, in the views of all layers.
+
+    A file names the layers whose boundaries cut a view. So these layers must still exist, and stand
+    in front of the first layer that shows the view, or be that layer [PYR-40].
+    """
     boundaries = [layer.boundary for layer in layers]
     shown: dict[Texture, Texture] = {}
     for i, layer in enumerate(layers):

@@ -1,4 +1,4 @@
-"""From a picture to pixels: what is asked for, checked; drawn tile by tile (`compose`)."""
+"""Rendering of a picture to pixels: checks the request, and has it drawn by `compose`."""
 
 from __future__ import annotations
 
@@ -37,28 +37,29 @@ def render(
 
     Args:
         image: The picture.
-        t: Time in seconds, of a picture with a timeline; by default the still is drawn.
-        width: Output columns; with `height` left out, the aspect is kept.
-        height: Output rows.
-        scale: Output pixels a canvas pixel, instead of width and height.
-        region: x, y, width, height in canvas pixels.
-        layers: Names or positions of the layers to draw; all that are not hidden by default.
+        t: Time in seconds in the timeline of the picture; by default the still is drawn.
+        width: Output columns; without `height`, the aspect ratio is kept.
+        height: Output rows; without `width`, the aspect ratio is kept.
+        scale: Output pixels per canvas pixel, instead of `width` and `height`.
+        region: x, y, width, height in canvas pixels; the whole canvas by default.
+        layers: Names or positions of the layers to draw; by default all that are not hidden.
         background: Whether to draw the back layer of an opaque picture.
         dtype: uint8 or uint16 (rounded), or float32 in 0..1.
         engine: ``auto``, ``numpy``, ``native`` or ``ort``.
-        limits: Bounds the output.
-        progress: Called with the number of pixels after each tile.
-        cache: Colours that were computed before; this call adds to them.
+        limits: Bounds on the size of the output and on the work it may take.
+        progress: Called after each tile with the number of its pixels.
+        cache: Colours computed before; this call adds to them.
 
     Returns:
-        [height, width, 3] if the result is opaque by construction, otherwise
-        [height, width, 4] with straight alpha.
+        Pixels of type `dtype`: [height, width, 3] if the picture is opaque and its back layer is
+        drawn, otherwise [height, width, 4] with straight alpha.
 
     Raises:
-        UsageError: A request that makes no sense, an unknown layer, or a time of a picture
-            that does not move.
+        UsageError: The arguments contradict each other or are out of range, a layer is unknown, or
+            `t` is given for a picture without a timeline.
         UnsupportedError: The engine is not installed.
-        LimitError: The output is too large.
+        LimitError: The output is too large, or takes too much work.
+        FormatError: A coded stream that is decoded only now is corrupt.
     """
     picture = image.picture if t is None else at(image.picture, t)
     kind = _sample_type(dtype)
@@ -89,10 +90,15 @@ def _sample_type(dtype: Any) -> np.dtype[Any]:
 
 
 def selected(image: Pictured, layers: Sequence[str | int] | None, background: bool) -> list[Layer]:
-    """The layers to draw, back to front; those that are not hidden by default.
+    """Selects the layers to draw, back to front.
+
+    Args:
+        image: The picture.
+        layers: Names or positions of the wanted layers; None for all that are not hidden.
+        background: Whether the back layer of an opaque picture may be among them.
 
     Raises:
-        UsageError: An unknown layer, or none is left.
+        UsageError: A layer is unknown, or the arguments leave no layer.
     """
     picture = image.picture
     if layers is None:
@@ -110,7 +116,7 @@ def selected(image: Pictured, layers: Sequence[str | int] | None, background: bo
 
 
 def _finished(tile: NDArray[np.float32], solid: bool, dtype: np.dtype[Any]) -> NDArray[Any]:
-    """Premultiplied [h, w, 4] as straight alpha or opaque output samples."""
+    """Converts premultiplied [h, w, 4] to output samples, opaque or with straight alpha."""
     if not solid:
         tile = tile.copy()
         tile[..., :3] /= np.maximum(tile[..., 3:], np.float32(1e-6))

@@ -1,4 +1,4 @@
-"""How close a decoded picture is to its original."""
+"""Quality of a decoded picture, measured against its original."""
 
 from __future__ import annotations
 
@@ -14,14 +14,17 @@ from .pixels import render
 
 
 def psnr(original: NDArray[Any], image: Pictured) -> float | None:
-    """PSNR in dB of the decoded 8-bit picture, or None if it is exact.
+    """PSNR in dB of the decoded 8-bit picture; None if it equals the original rounded to 8 bits.
 
-    Opaque pictures are compared in RGB; others in premultiplied RGBA, so that the colour of
-    invisible pixels does not count.
+    Opaque pictures are compared in RGB. Others are compared in premultiplied RGBA, so that the
+    colour of invisible pixels does not count.
 
     Args:
-        original: [H, W] or [H, W, 1..4] samples, as `encode` takes them.
-        image: The picture.
+        original: [H, W] or [H, W, 1..4] samples of the size of the canvas, as `encode` takes them.
+        image: The decoded picture.
+
+    Raises:
+        InputError: `original` is not a picture.
     """
     eight_bit = np.rint(to_float(original)[0] * 255).astype(np.uint8)
     return psnr_8bit(eight_bit, render(image))

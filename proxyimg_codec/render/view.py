@@ -1,4 +1,4 @@
-"""Which output pixels are wanted: size, region, and how samples are averaged when reducing."""
+"""Views: region and output size of a rendering, and the samples that each pixel averages."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from numpy.typing import NDArray
 from ..errors import LimitError, UsageError
 
 SIDE_MAX = 1 << 21
-"""Most output columns or rows; keeps fixed-point coordinates within 64 bits."""
+"""Most output columns or rows, so that fixed-point coordinates fit in 64 bits."""
 
 SUPERSAMPLING_MAX = 64
-"""Most samples along an axis of an output pixel: bounds what a thumbnail costs."""
+"""Most samples of an output pixel along an axis: bounds the cost of a thumbnail."""
 
 
 @dataclass(frozen=True)
 class View:
-    """A region of the canvas and the output pixels it becomes.
+    """Region of the canvas, and the size of the output that it is rendered to.
 
     Attributes:
         x: Left edge of the region in canvas pixels.
-        y: Top edge.
-        region_width: Extent in canvas pixels.
-        region_height: Likewise.
+        y: Top edge of the region in canvas pixels.
+        region_width: Width of the region in canvas pixels.
+        region_height: Height of the region in canvas pixels.
         width: Output columns.
         height: Output rows.
     """
@@ -40,25 +40,25 @@ class View:
 
     @property
     def supersampling(self) -> tuple[int, int]:
-        """Samples across and down an output pixel: the canvas pixels it spans, at most 64."""
+        """Samples of an output pixel across and down: one per canvas pixel it spans, at most 64."""
         across = -(-self.region_width // self.width)
         down = -(-self.region_height // self.height)
         return min(across, SUPERSAMPLING_MAX), min(down, SUPERSAMPLING_MAX)
 
     @property
     def grid(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Canvas point [2] of the corner of the sample grid, and samples a canvas pixel [2]."""
+        """Canvas point [2] of the corner of the sample grid, and samples per canvas pixel [2]."""
         sx, sy = self.supersampling
         pitch = [self.width * sx / self.region_width, self.height * sy / self.region_height]
         return np.array([self.x, self.y], np.float64), np.array(pitch)
 
     def columns(self, start: int, stop: int) -> NDArray[np.float64]:
-        """Canvas x of sample columns start..stop-1; samples sit at the centres of their cells."""
+        """Canvas x, float64 [stop - start], of the centres of sample columns start..stop - 1."""
         n = self.width * self.supersampling[0]
         return _centres(self.x, start, stop, self.region_width / n)
 
     def rows(self, start: int, stop: int) -> NDArray[np.float64]:
-        """Canvas y of sample rows start..stop-1."""
+        """Canvas y, float64 [stop - start], of the centres of sample rows start..stop - 1."""
         n = self.height * self.supersampling[1]
         return _centres(self.y, start, stop, self.region_height / n)
 
@@ -74,18 +74,20 @@ def make_view(
     scale: float | None = None,
     region: tuple[int, int, int, int] | None = None,
 ) -> View:
-    """The view for a request; what is not given follows from the rest, keeping the aspect.
+    """Makes the view of a request.
 
     Args:
-        canvas: Width and height of the canvas.
-        width: Output columns.
-        height: Output rows.
-        scale: Output pixels a canvas pixel, instead of width and height.
+        canvas: Width and height of the canvas in pixels.
+        width: Output columns; without `height`, the aspect ratio is kept.
+        height: Output rows; without `width`, the aspect ratio is kept.
+        scale: Output pixels per canvas pixel, instead of `width` and `height`; with none of the
+            three it is 1.
         region: x, y, width, height in canvas pixels; the whole canvas by default.
 
     Raises:
-        UsageError: Contradictory, empty or non-finite request, or a region outside the canvas.
-        LimitError: More than `SIDE_MAX` columns or rows.
+        UsageError: The request is contradictory, empty or not finite, or the region leaves the
+            canvas.
+        LimitError: The output would have more than `SIDE_MAX` columns or rows.
     """
     try:
         x, y, w, h = map(operator.index, region or (0, 0, *canvas))

@@ -1,1 +1,1 @@
-"""Textures: planes of codes, the network that decodes them, and the engines that run it."""
+"""Textures of both coders: implicit (codes and a network of the file) and pyramid (rasters)."""

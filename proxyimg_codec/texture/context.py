@@ -1,7 +1,7 @@
-"""The context model of the pyramid coder: whole numbers in, distributions of latents out.
+"""Context model of the pyramid coder: predicts distributions of latents from those coded before.
 
-All arithmetic is on whole numbers below 2**24, which float32 holds exactly whatever the order of
-sums, so that the matrix products of numpy may be used and every decoder finds the same
+All arithmetic is on integers below 2**24. As float32 holds these exactly, sums do not depend on
+their order. So the matrix products of numpy may be used, and every decoder finds the same
 probabilities (spec chapter 8).
 """
 
@@ -21,7 +21,7 @@ from .registered_model import CAUSAL, STEP_ORIGIN, Array, Context
 Ints = NDArray[np.int32]
 
 LIMIT = 1 << 16
-"""Latents are smaller than this in magnitude, so that no sum overflows."""
+"""Bound of the magnitude of latents, so that no sum overflows."""
 
 BAD_ESCAPES = "the list of escapes is truncated or corrupt"
 BAD_LATENT = f"a latent is not between {-LIMIT} and {LIMIT}"
@@ -33,23 +33,37 @@ HIGH = ((6, -97, -97, 6, 0), (10, -28, 218, -28, 10))
 
 
 class Coder(Protocol):
-    """Either end of the entropy coder."""
+    """Protocol of the entropy coder: an encoder or a decoder of latents."""
 
     def code(
         self, values: NDArray[np.int64], mean: NDArray[np.int64], scale: NDArray[np.int64]
     ) -> NDArray[np.int64]:
-        """Codes latents [N]; a decoder ignores `values` and returns them, an encoder too."""
+        """Encodes or decodes latents.
+
+        Args:
+            values: [N] latents to encode; a decoder ignores them.
+            mean: [N] predicted means in 1/16.
+            scale: [N] predicted scale indices.
+
+        Returns:
+            [N] latents.
+        """
 
 
 class Wave(NamedTuple):
-    """Positions that are coded together: none is a neighbour of another's."""
+    """Positions that are coded together, because none is a neighbour of another.
+
+    Attributes:
+        rows: [N] rows of the positions.
+        columns: [N] columns of the positions.
+    """
 
     rows: NDArray[np.int64]
     columns: NDArray[np.int64]
 
 
 def waves(support: NDArray[np.bool_]) -> Iterator[Wave]:
-    """Positions of `support` [H, W] by x + 3 y ascending, within a wave by y."""
+    """Yields the positions of `support` [H, W] in coding order: by x + 3 y, within a wave by y."""
     h, w = support.shape
     flat = support.ravel()
     for t in range(w + 3 * (h - 1)):
@@ -60,14 +74,15 @@ def waves(support: NDArray[np.bool_]) -> Iterator[Wave]:
 
 
 def next_plain(low: Ints, high: Ints) -> Ints:
-    """The next finer plane of the plain wavelet, which conditions the context.
+    """Computes the next finer plane by the plain wavelet, as an input of the context network.
 
     Args:
-        low: [3, h, w] in 1/16.
-        high: Latents [9, h, w], channel 3 * colour + band; bands (v, h) = (0,1), (1,0), (1,1).
+        low: int32 [3, h, w] in 1/16.
+        high: int32 [9, h, w] latents, channel 3 * colour + band. The bands, as (vertical,
+            horizontal) with 1 for high pass, are (0, 1), (1, 0), (1, 1).
 
     Returns:
-        [3, 2h, 2w] in 1/16.
+        int32 [3, 2 h, 2 w] in 1/16, at most `LIMIT` in magnitude.
     """
     bands = high.reshape(3, 3, *high.shape[1:]) << 4
     left = _lift(low, bands[:, 1], 1)
@@ -78,7 +93,7 @@ def next_plain(low: Ints, high: Ints) -> Ints:
 
 
 def _lift(low: Ints, high: Ints, axis: int) -> Ints:
-    """One axis of the synthesis: sums in 1/256, rounded half up."""
+    """Wavelet synthesis along one axis, with sums in 1/256, rounded half up."""
     n = low.shape[axis]
     out = []
     for phase in range(2):
@@ -93,9 +108,10 @@ def _lift(low: Ints, high: Ints, axis: int) -> Ints:
 
 
 def _shifted(n: int, by: int, high: bool) -> NDArray[np.int64]:
-    """Indices i + by of 0..n-1, mirrored at the ends.
+    """Indices i + by for i = 0..n-1, mirrored at the ends.
 
-    Low bands mirror about their first sample and behind their last, high bands the reverse.
+    A low band is mirrored about its first sample and behind its last one, a high band before its
+    first sample and about its last one.
     """
     index = np.arange(n) + by
     index = np.where(index < 0, -index - int(high), index)
@@ -104,54 +120,55 @@ def _shifted(n: int, by: int, high: bool) -> NDArray[np.int64]:
 
 
 def _squashed(numerator: NDArray[Any], unit: int) -> NDArray[Any]:
-    """32 x / (1 + |x| / 4), x = numerator / unit, rounded half up away from zero."""
-    size = np.minimum(np.abs(numerator), 508 * unit)  # gives 127 at most, as training has it
+    """32 x / (1 + |x| / 4) with x = numerator / unit, rounded to nearest, halves away from zero."""
+    size = np.minimum(np.abs(numerator), 508 * unit)  # a result of at most 127, as in training
     under = 4 * unit + size
     out: NDArray[Any] = np.sign(numerator) * ((128 * size + under // 2) // under)
     return out
 
 
 LOG = np.rint(32 * np.log1p(np.arange(53))).astype(np.int32)
+"""Table of 32 ln(1 + n), rounded; the last value is 127."""
 
 
 def log_feature(latents: NDArray[np.integer[Any]]) -> Ints:
-    """32 ln(1 + |y|), rounded, at most 127."""
+    """Feature 32 ln(1 + |y|) of latents y, rounded, at most 127; int32 of the same shape."""
     out: Ints = LOG.take(np.minimum(np.abs(latents), len(LOG) - 1))
     return out
 
 
 def high_pass(plane: Ints) -> Ints:
-    """Feature [3, h, w] of a plain plane: its difference from the mean of 3 x 3, squashed."""
+    """Feature of plain planes [C, h, w]: squashed difference from the mean of 3 x 3 neighbours."""
     p = np.pad(plane, ((0, 0), (1, 1), (1, 1)), mode="edge")
     rows = p[:, :, :-2] + p[:, :, 1:-1] + p[:, :, 2:]
     return _squashed(9 * plane - (rows[:, :-2] + rows[:, 1:-1] + rows[:, 2:]), 144)
 
 
 def scaled(total: Floats, bits: int) -> Floats:
-    """Whole numbers times 2**-bits, rounded half up; in place."""
+    """Multiplies integers by 2**-bits, rounded half up, in place."""
     total *= np.float32(2.0**-bits)
     total += np.float32(0.5)
     return np.floor(total, out=total)
 
 
 def activated(total: Floats, bits: int) -> Floats:
-    """An 8-bit activation, in 1/32."""
+    """Scales sums of a layer by 2**-bits in place, and clamps them to activations 0..255 (1/32)."""
     return _clamped(scaled(total, bits), 0, 255)
 
 
 def _clamped(values: Floats, low: float, high: float) -> Floats:
-    """`np.clip` in place; for small arrays much faster."""
+    """Clamps values in place, much faster than `np.clip` for small arrays."""
     return np.minimum(np.maximum(values, low, out=values), high, out=values)
 
 
 class LevelCoder:
-    """Codes the latents of one level.
+    """Encoder and decoder of the latents of one level.
 
     Attributes:
-        weights: Its context network.
-        grey: Whether it has no chroma.
-        shifts: Added to the scale index: luma, chroma.
-        first_bias: int32 [C] biases of the first layer at the step.
+        weights: Context network of the level.
+        grey: Whether the level has no chroma.
+        shifts: Numbers added to the scale index of luma and of chroma.
+        first_bias: int32 [C] biases of the first layer for the quantization step.
     """
 
     def __init__(self, weights: Context, step: int, grey: bool, shifts: tuple[int, int]) -> None:
@@ -166,17 +183,17 @@ class LevelCoder:
     def code(
         self, coder: Coder, low: Ints, parent: Ints, support: NDArray[np.bool_], values: Ints | None
     ) -> Ints:
-        """Codes a level.
+        """Encodes or decodes a level.
 
         Args:
             coder: The entropy coder.
-            low: Plain plane [3, h, w] in 1/16.
-            parent: Latents of the coarser level [9, h / 2, w / 2], or zeros.
-            support: [h, w] positions that are coded; latents elsewhere are 0.
-            values: Latents [9, h, w] to encode, or None.
+            low: int32 [3, h, w] plain planes in 1/16.
+            parent: int32 [9, ceil(h / 2), ceil(w / 2)] latents of the coarser level, or zeros.
+            support: bool [h, w], True at positions that are coded; latents elsewhere are 0.
+            values: int32 [9, h, w] latents to encode; None to decode.
 
         Returns:
-            The latents, int32 [9, h, w].
+            int32 [9, h, w] latents.
         """
         h, w = support.shape
         ahead = self._ahead(low, parent)  # [h * w, C]
@@ -200,7 +217,14 @@ class LevelCoder:
         self, coder: Coder, ahead: NDArray[np.int16], around: Floats,
         given: NDArray[np.int64] | None,
     ) -> NDArray[np.int64]:  # fmt: skip
-        """Latents [N, 9] of positions with their context."""
+        """Codes the latents [N, 9] of a wave.
+
+        Args:
+            coder: The entropy coder.
+            ahead: [N, C] part of the hidden layer from coarser levels, in 1/256.
+            around: [N, 216] features of the latents coded before.
+            given: [N, 9] latents to encode; None to decode.
+        """
         w = self.weights
         z = scaled(around @ self._causal, -w.causal.exponent - 3)
         z += ahead
@@ -223,7 +247,7 @@ class LevelCoder:
         self, coder: Coder, total: Floats, weights: Array, bias: Array, kind: int,
         given: NDArray[np.int64] | None, out: NDArray[np.int64],
     ) -> None:  # fmt: skip
-        """Codes n latents of each position from network outputs [N, 2n] into `out` [N, n]."""
+        """Codes n latents of each position to `out` [N, n] by network outputs `total` [N, 2 n]."""
         total += _floats(bias)
         n = out.shape[1]
         mean = _clamped(scaled(total[:, :n].copy(), 1 - weights.exponent), -(1 << 14), 1 << 14)
@@ -234,7 +258,7 @@ class LevelCoder:
         out[:] = coded.reshape(out.shape)
 
     def _ahead(self, low: Ints, parent: Ints) -> NDArray[np.int16]:
-        """What does not depend on the level itself [h * w, C], in 1/256."""
+        """Part [h * w, C] of the hidden layer that depends on coarser levels only, in 1/256."""
         w = self.weights
         h, width = low.shape[1:]
         inputs = np.empty((12, h, width), np.int8)
@@ -250,7 +274,7 @@ class LevelCoder:
             z = activated(z, -w.first.exponent)
             z = z.reshape(-1, width, z.shape[1])
             if top == 0:
-                z[0] = 0  # rows outside are 0, not what their bias would give
+                z[0] = 0  # rows outside count as 0, without their bias
             if bottom == h:
                 z[-1] = 0
             z = convolved(z, second, 1, 1 + bottom - top)

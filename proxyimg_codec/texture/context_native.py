@@ -1,4 +1,4 @@
-"""Levels of a pyramid in the compiled kernel (`native/context.h`); `context` is its judge."""
+"""Coding of a level in the compiled kernel (`native/context.h`); `context` is the reference."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ WEIGHTS = (
     "luma_bias", "from_luma", "from_luma_bias", "chroma", "chroma_bias",
 )  # fmt: skip
 BITS = {"first": 0, "second": 3, "causal": 3, "mix": 0, "luma": -1, "from_luma": 3, "chroma": -1}
-"""Layers, and the bits that their results keep beyond 1/32."""
+"""Layers of the network, and the fractional bits that their results have beyond 1/32."""
 
 STREAM_ENDS, ESCAPES_END, OUT_OF_RANGE = 1, 2, 3
 
@@ -79,7 +79,14 @@ class _Level(ct.Structure):
 
 
 class Place(NamedTuple):
-    """Where a level is coded, and what is known before: see `LevelCoder.code`."""
+    """Level to code, with its inputs; arrays are those of `LevelCoder.code`.
+
+    Attributes:
+        coder: Coder of the level, with the weights of its network.
+        low: int32 [3, h, w] plain planes in 1/16.
+        parent: int32 [9, ceil(h / 2), ceil(w / 2)] latents of the coarser level, or zeros.
+        support: bool [h, w], True at positions that are coded.
+    """
 
     coder: LevelCoder
     low: Ints
@@ -91,16 +98,18 @@ def decode(at: Place, stream: rans.Decoder, escapes: bytes, used: int) -> tuple[
     """Decodes a level.
 
     Args:
-        at: What is decoded.
-        stream: The entropy-coded stream; it moves on.
+        at: Level to decode.
+        stream: The entropy-coded stream, which is advanced.
         escapes: The list of escapes.
-        used: How many bytes of it were read before.
+        used: Number of bytes of `escapes` that were read before.
 
     Returns:
-        The latents, int32 [9, h, w], and how many bytes of the escapes are read now.
+        int32 [9, h, w] latents, and the number of bytes of `escapes` read by now.
 
     Raises:
-        FormatError: As `planes` raises it.
+        FormatError: The stream or the list of escapes is too short or corrupt, or a latent is out
+            of range.
+        MemoryError: The kernel cannot allocate what it needs.
     """
     words, states = stream.words.astype(np.uint16), stream.states.astype(np.uint32)
     listed = np.frombuffer(escapes, np.uint8)
@@ -118,12 +127,15 @@ def encode(at: Place, values: Ints, stream: rans.Encoder) -> tuple[Ints, NDArray
     """Encodes a level.
 
     Args:
-        at: What is encoded.
-        values: Latents [9, h, w].
-        stream: Where symbols are put.
+        at: Level to encode.
+        values: int32 [9, h, w] latents, less than `context.LIMIT` in magnitude.
+        stream: The encoder to which symbols are added.
 
     Returns:
-        The latents as they are decoded, and the differences that escape, int64 [N].
+        int32 [9, h, w] latents as a decoder finds them, and int64 [N] differences that escape.
+
+    Raises:
+        MemoryError: The kernel cannot allocate what it needs.
     """
     h, w = at.support.shape
     most = 9 * int(np.count_nonzero(at.support))
@@ -137,7 +149,7 @@ def encode(at: Place, values: Ints, stream: rans.Encoder) -> tuple[Ints, NDArray
 
 
 def _run(at: Place, values: Ints | None, source: _Source, sink: _Sink) -> tuple[_Level, Ints]:
-    """Calls the kernel; the structure as it comes back, and the latents."""
+    """Calls the kernel, and returns its structure after the call, and the latents."""
     lib = kernel.library()
     assert lib is not None, "check available() first"
     coder, weights = at.coder, at.coder.weights

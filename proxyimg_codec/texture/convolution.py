@@ -11,26 +11,33 @@ from numpy.typing import NDArray
 from .network import Floats
 
 STRIP, LEAST = 1 << 11, 4
-"""Positions that are convolved at a time, and rows at least: bounds memory."""
+"""Positions convolved at a time, which bounds memory, and the least number of rows."""
 
 
 def strips(height: int, width: int) -> Iterator[tuple[int, int]]:
-    """First row and end of each strip of a plane."""
+    """Yields the first row and the end of each strip of a plane."""
     rows = max(STRIP // width, LEAST)
     for top in range(0, height, rows):
         yield top, min(top + rows, height)
 
 
 def by_row(weights: NDArray[Any]) -> Floats:
-    """Weights [out, C, k, k] as matrices by kernel row: float32 [k, k C, out]."""
+    """Rearranges weights [out, C, k, k] to one matrix per kernel row, float32 [k, k * C, out]."""
     w = weights.transpose(2, 3, 1, 0)
     return np.ascontiguousarray(w.reshape(len(w), -1, w.shape[3]), np.float32)
 
 
 def convolved(plane: NDArray[Any], rows: Floats, top: int, bottom: int) -> Floats:
-    """Convolution of rows top..bottom - 1 of a plane [h, w, C]: float32 [(bottom - top) w, out].
+    """Convolves a strip of a plane; positions outside the plane count as 0.
 
-    What lies outside the plane is 0. `rows` is from `by_row`.
+    Args:
+        plane: [h, w, C] values.
+        rows: float32 [k, k * C, out] weights, as `by_row` makes them.
+        top: First row of the result; may be negative.
+        bottom: Row after the last; may be larger than h.
+
+    Returns:
+        float32 [(bottom - top) * w, out].
     """
     h, w, channels = plane.shape
     size = len(rows)
@@ -40,7 +47,7 @@ def convolved(plane: NDArray[Any], rows: Floats, top: int, bottom: int) -> Float
     padded = np.zeros((count + size - 1, w + size - 1, channels), np.float32)
     inside = slice(start - top + reach, end - top + reach)
     padded[inside, reach : w + reach] = plane[start:end]
-    # Neighbours along a row are next to each other in memory: a window is one stretch.
+    # The neighbours of a position in one row are contiguous in memory, so a window is a view.
     windows = np.lib.stride_tricks.as_strided(
         padded,
         (count + size - 1, w, size * channels),

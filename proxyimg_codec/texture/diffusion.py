@@ -1,4 +1,4 @@
-"""Normative fill of codes that a layer does not store: smooth, integer, the same everywhere."""
+"""Fill of unknown values of a plane by diffusion in integers: smooth, and exact in all decoders."""
 
 from __future__ import annotations
 
@@ -8,37 +8,44 @@ import numpy as np
 from numpy.typing import NDArray
 
 FRACTION_BITS = 8
-"""Filled values have this many fractional bits."""
+"""Fractional bits of filled values."""
 
 SWEEPS = 8
 """Jacobi sweeps at each level."""
 
 TILE = 128
-"""Positions a side that are swept together, so that they stay in the cache."""
+"""Side of the tiles that are swept one by one, so that they stay in the processor cache."""
 
 Values = NDArray[np.int32]
 
 
 def fill(codes: NDArray[np.integer], stored: NDArray[np.bool_]) -> Values:
-    """Values [C, H, W] with `FRACTION_BITS` fractional bits: stored ones kept, others diffused.
+    """Fills the codes that are not stored by diffusion from the stored ones.
 
     Args:
-        codes: [C, H, W] integers of magnitude below 2**16; those not stored do not matter.
-        stored: [H, W]; at least one position must be stored.
+        codes: [C, H, W] integers below 2**16 in magnitude; those not stored have no influence.
+        stored: bool [H, W], True at stored positions, of which there is at least one.
+
+    Returns:
+        int32 [C, H, W] values with `FRACTION_BITS` fractional bits.
     """
     return diffused(codes.astype(np.int32) << FRACTION_BITS, stored)
 
 
 def diffused(value: Values, known: NDArray[np.bool_]) -> Values:
-    """Values [C, H, W] as they are where `known`, others diffused from these.
+    """Fills unknown values by diffusion from the known ones [TEX-5 to TEX-9].
 
-    Pull: each level halves the plane; a cell is the mean, rounded half up, of its known children,
-    known if any is. Push: from coarse to fine an unknown cell takes its parent's value, then
-    `SWEEPS` times the mean of its four neighbours, (sum + 2) >> 2, edges repeated, all at once.
+    Pull: each level halves the plane. A cell is the mean, rounded half up, of its known children,
+    and is known if any child is. Push: from coarse to fine, an unknown cell takes the value of its
+    parent. Then, `SWEEPS` times, all unknown cells at once take the mean (sum + 2) >> 2 of their
+    four neighbours, where edges are repeated.
 
     Args:
-        value: Magnitudes below 2**24; those not known do not matter.
-        known: [H, W]; at least one position must be known.
+        value: int32 [C, H, W] values below 2**24 in magnitude; unknown ones have no influence.
+        known: bool [H, W], True at known positions, of which there is at least one.
+
+    Returns:
+        int32 [C, H, W]; `value` itself if all is known.
     """
     if known.all():
         return value
@@ -62,10 +69,10 @@ def _pull(value: Values, known: NDArray[np.bool_]) -> tuple[Values, NDArray[np.b
 
 
 def _smooth(value: Values, known: NDArray[np.bool_]) -> Values:
-    """`value` with its unknown positions swept.
+    """Sweeps the unknown positions of a plane, tile by tile.
 
-    In tiles with a rim that is as wide as there are sweeps: what is cut off there cannot have come
-    as far as the tile when they are done.
+    Each tile is swept together with a rim of `SWEEPS` positions. An influence moves on by one
+    position per sweep, so the cut-off outside of the rim cannot reach the tile.
     """
     h, w = known.shape
     out = value.copy()
@@ -82,7 +89,7 @@ def _smooth(value: Values, known: NDArray[np.bool_]) -> Values:
 
 
 def _swept(value: Values, unknown: NDArray[np.bool_]) -> Values:
-    """All sweeps of a small plane."""
+    """Makes all sweeps of a small plane."""
     p = np.pad(value, ((0, 0), (1, 1), (1, 1)), mode="edge")
     inner = p[:, 1:-1, 1:-1]
     for _ in range(SWEEPS):

@@ -1,4 +1,4 @@
-"""The implicit texture: a plane of codes in the layer's box, decoded by an MLP."""
+"""Implicit texture: a plane of codes over the box of a layer, decoded by a network of the file."""
 
 from __future__ import annotations
 
@@ -17,16 +17,19 @@ from .diffusion import FRACTION_BITS, fill
 from .network import Floats, Network, read_halves
 
 Box = tuple[int, int, int, int]
+"""Rectangle x, y, width, height, in canvas pixels or samples."""
 
 
 class Taps(NamedTuple):
-    """Bilinear taps of N points into codes [rows, D]: rows base, base + 1 and those `stride` on.
+    """Places and weights for the bilinear interpolation of N points in a table of codes [rows, D].
+
+    The four codes of a point are the rows base, base + 1, base + stride and base + stride + 1.
 
     Attributes:
         base: int32 [N] row of the upper left code.
-        fx: float32 [N] horizontal fraction.
-        fy: float32 [N] vertical fraction.
-        stride: Rows from a code to the one below.
+        fx: float32 [N] horizontal fraction in 0..1.
+        fy: float32 [N] vertical fraction in 0..1.
+        stride: Number of rows from a code to the one below.
     """
 
     base: NDArray[np.int32]
@@ -36,9 +39,16 @@ class Taps(NamedTuple):
 
 
 def taps(x: NDArray[np.float64], y: NDArray[np.float64], box: Box, columns: int, rows: int) -> Taps:
-    """Taps of canvas points x, y [N] in a plane whose corner codes sit on the corners of `box`.
+    """Taps of points in a plane whose corner codes lie on the corners of a box.
 
     Points outside the box take the value at its rim.
+
+    Args:
+        x: float64 [N] x of the points in canvas pixels.
+        y: float64 [N] y of the points.
+        box: The rectangle over which the plane is stretched, in canvas pixels.
+        columns: Columns of the plane.
+        rows: Rows of the plane.
     """
     x0, y0, width, height = box
     ix, fx = _position(x, x0, width, columns)
@@ -51,7 +61,7 @@ def taps(x: NDArray[np.float64], y: NDArray[np.float64], box: Box, columns: int,
 def _position(
     points: NDArray[np.float64], start: int, extent: int, codes: int
 ) -> tuple[NDArray[np.int32], Floats]:
-    """Codes before points on one axis, and fractions; in place, for the sake of the cache."""
+    """Index of the code before each point along one axis, and the fraction to the next code."""
     grid = points - start
     grid *= (codes - 1) / extent
     np.clip(grid, 0, codes - 1, out=grid)
@@ -63,14 +73,14 @@ def _position(
 
 @dataclass(frozen=True, eq=False)
 class ImplicitTexture:
-    """A quantized plane of codes.
+    """Texture as a quantized plane of codes.
 
     Attributes:
-        network: Index of the network in the file.
-        bits: Bits a code, 2..8.
+        network: Index of the decoder network in the file.
+        bits: Bits per code, 2..8.
         steps: float16 [D] quantization step of each feature.
-        codes: int8 [D, rows, columns]; 0 where not stored.
-        stored: bool [rows, columns].
+        codes: int8 [D, rows, columns] codes; 0 where they are not stored.
+        stored: bool [rows, columns], True at stored positions.
     """
 
     network: int
@@ -81,11 +91,11 @@ class ImplicitTexture:
 
     @property
     def arrays(self) -> tuple[NDArray[Any], ...]:
-        """What it is made of."""
+        """Arrays of the texture."""
         return self.codes, self.stored
 
     def channels(self, networks: Sequence[Network]) -> int:
-        """Outputs of its network; `networks` are those of the file."""
+        """Number of outputs of its network, 3 or 4; `networks` are all networks of the file."""
         return networks[self.network].shape.channels
 
     @property
@@ -95,12 +105,12 @@ class ImplicitTexture:
 
     @cached_property
     def packed(self) -> Mapping[str, Any]:
-        """The fields of TEXR: those it was read from, or coded anew."""
+        """Fields of TEXR: those that the texture was read from, otherwise newly coded ones."""
         return pack(self)
 
     @cached_property
     def table(self) -> Floats:
-        """Dequantized codes [rows * columns, D], holes filled by the normative diffusion."""
+        """Dequantized codes float32 [rows * columns, D], filled by diffusion where not stored."""
         filled = fill(self.codes, self.stored)
         scale = self.steps.astype(np.float32) / (1 << FRACTION_BITS)
         return np.ascontiguousarray(
@@ -108,11 +118,11 @@ class ImplicitTexture:
         )
 
     def taps(self, x: NDArray[np.float64], y: NDArray[np.float64], box: Box) -> Taps:
-        """Taps of canvas points x, y [N]; `box` is the layer's rectangle."""
+        """Taps of canvas points x, y, float64 [N] each; `box` is the rectangle of the layer."""
         return taps(x, y, box, *self.grid)
 
     def features(self, at: Taps) -> Floats:
-        """Features [N, D] at N points."""
+        """Features float32 [N, D] at N points, interpolated bilinearly."""
         dim = self.table.shape[1]
         # Repeated, because numpy broadcasts slowly along short rows.
         fx, fy = (f.repeat(dim).reshape(-1, dim) for f in (at.fx, at.fy))
@@ -124,7 +134,7 @@ class ImplicitTexture:
 
 
 def _mix(a: Floats, b: Floats, share: Floats) -> Floats:
-    """The mixture a + (b - a) * share, in the memory of both."""
+    """Interpolates a + (b - a) * share; overwrites a, which is the result, and b."""
     b -= a
     b *= share
     a += b
@@ -132,7 +142,7 @@ def _mix(a: Floats, b: Floats, share: Floats) -> Floats:
 
 
 def pack(texture: ImplicitTexture) -> dict[str, Any]:
-    """The fields of TEXR."""
+    """Encodes a texture as the fields of TEXR."""
     stored = b""
     if not texture.stored.all():
         stored = arrays.encode(
@@ -156,10 +166,17 @@ def unpack(
     where: str = "chunk TEXR",
     sampling: int = 0,
 ) -> ImplicitTexture:
-    """Inverse of `pack`; `networks` are those of the file, `sampling` is the layer's.
+    """Decodes an implicit texture.
+
+    Args:
+        fields: Values of TEXR.
+        networks: All networks of the file.
+        where: Name of the chunk in error messages.
+        sampling: Sampling mode of the layer, which decides the number of features of a code.
 
     Raises:
-        FormatError: Corrupt streams, wrong lengths, or no stored code at all.
+        FormatError: A stream is corrupt or has a wrong length, a step is not positive, or the mask
+            of stored codes is full or empty.
     """
     columns, rows = fields["grid"]
     dim = networks[fields["network"]].shape.dim

@@ -1,4 +1,4 @@
-"""The decoder network: frequency encoding of features and a small ReLU MLP with integer weights."""
+"""Decoder network: frequency encoding of features, and a small ReLU MLP with quantized weights."""
 
 from __future__ import annotations
 
@@ -18,11 +18,12 @@ from ..errors import FormatError
 Floats = NDArray[np.float32]
 
 BLOCK, LARGE_BLOCK = 64, 4096
-"""Points a matrix product. BLAS takes a small product as it is and on one thread; where layers are
-large, copies in an order of its own and the work of other threads are worth their cost."""
+"""Points per matrix product, for small and for large networks. BLAS computes a small product
+directly and on one thread. For large layers it pays to have it rearrange the data and use more
+threads."""
 
 SMALL = 1 << 18
-"""Most multiplications of a product of `BLOCK` points."""
+"""Most multiplications per layer and `BLOCK` points of a small network."""
 
 
 @dataclass(frozen=True)
@@ -30,8 +31,8 @@ class NetShape:
     """Sizes of a network.
 
     Attributes:
-        dim: Features a point, D.
-        octaves: Octaves of the frequency encoding, L (0 = the features themselves).
+        dim: Number of features of a point, D.
+        octaves: Octaves of the frequency encoding, L; 0 = features only.
         hidden: Width of the hidden layers.
         depth: Number of hidden layers.
         channels: Outputs, 3 (colour) or 4 (premultiplied colour and alpha).
@@ -45,31 +46,31 @@ class NetShape:
 
     @property
     def layers(self) -> list[tuple[int, int]]:
-        """(inputs, outputs) of each linear layer."""
+        """Numbers of inputs and outputs of each linear layer."""
         sizes = [self.dim * (2 * self.octaves + 1), *[self.hidden] * self.depth, self.channels]
         return list(pairwise(sizes))
 
     @property
     def rows(self) -> int:
-        """Output rows of all layers together; each has a step and a bias."""
+        """Number of outputs of all layers together; each has a step and a bias."""
         return sum(o for _, o in self.layers)
 
     @property
     def parameters(self) -> int:
-        """Weights and biases."""
+        """Number of weights and biases."""
         return sum(i * o + o for i, o in self.layers)
 
 
 @dataclass(frozen=True, eq=False)
 class Network:
-    """A quantized network.
+    """Quantized decoder network.
 
     Attributes:
-        shape: Its sizes.
-        bits: Bits a weight, 2..8.
-        weights: For each layer int8 [out, in].
-        steps: float16 [rows] quantization step of each output row.
-        biases: float16 [rows].
+        shape: Sizes of the network.
+        bits: Bits per weight, 2..8.
+        weights: For each layer int8 [out, in] weights in units of the steps.
+        steps: float16 [rows] quantization step of the weights of each output.
+        biases: float16 [rows] bias of each output.
     """
 
     shape: NetShape
@@ -80,7 +81,7 @@ class Network:
 
     @cached_property
     def layers(self) -> list[tuple[Floats, Floats]]:
-        """(weights [out, in], biases [out]) of each layer as float32."""
+        """Dequantized weights [out, in] and biases [out] of each layer, float32."""
         ends = np.cumsum([o for _, o in self.shape.layers])[:-1]
         steps = np.split(self.steps.astype(np.float32), ends)
         biases = np.split(self.biases.astype(np.float32), ends)
@@ -91,17 +92,24 @@ class Network:
 
     @cached_property
     def packed(self) -> Mapping[str, Any]:
-        """The fields of NETW: those it was read from, or coded anew."""
+        """Fields of NETW: those that the network was read from, otherwise newly coded ones."""
         return pack(self)
 
-    # Numbers may overflow [TEX-19].
+    # Numbers may overflow, and a reader has to survive that [TEX-19].
     @np.errstate(over="ignore", invalid="ignore")
     def __call__(self, features: Floats) -> Floats:
-        """Outputs [N, channels] for features [N, D], not clamped.
+        """Runs the network.
 
-        Those of a point do not depend on the other points: matrix products round differently for
-        different sizes, so all are of as many points. (Where BLAS rounds even by place within a
-        product, as OpenBLAS does on machines with AVX2 only, a last bit may differ.)
+        The outputs of a point do not depend on the other points. As matrix products of different
+        sizes round differently, all have the same number of points. (Some BLAS round differently
+        even by the place within a product, as OpenBLAS does on machines with AVX2 only; then the
+        last bit may differ.)
+
+        Args:
+            features: float32 [N, D].
+
+        Returns:
+            float32 [N, channels] outputs, not clamped.
         """
         n, d = features.shape
         small = all(i * o * BLOCK <= SMALL for i, o in self.shape.layers)
@@ -112,7 +120,7 @@ class Network:
         x = x.reshape(len(x), -1, block).swapaxes(0, 1)  # [blocks, inputs, block]
         for i, (weight, bias) in enumerate(self.layers):
             x = weight @ x
-            # Both are repeated, because numpy broadcasts slowly along short rows.
+            # Biases are repeated, because numpy broadcasts slowly along short rows.
             x += bias.repeat(block).reshape(-1, block)
             if i + 1 < len(self.layers):
                 np.maximum(x, np.zeros(x.shape[1:], np.float32), out=x)
@@ -120,17 +128,24 @@ class Network:
 
 
 def encode_features(features: Floats, octaves: int) -> Floats:
-    """Frequency encoding [N, D (2 L + 1)] of features [N, D].
+    """Frequency encoding of features (ProxyImg, frequency encoding of features).
 
-    Order: features, then for each octave k = 0..L-1 sin(2^k pi f) and cos(2^k pi f), each D wide;
-    octaves above the first follow from the double-angle formulas (ProxyImg, frequency encoding
-    of features). In memory the points run fastest, and so had those of `features` better.
+    The result holds the features f, then for each octave k = 0..L-1 sin(2^k pi f) and
+    cos(2^k pi f), each D wide. Octaves above the first follow from the double-angle formulas.
+
+    Args:
+        features: float32 [N, D]; fastest if points are contiguous in memory, as in a transposed
+            array [D, N].
+        octaves: Number of octaves L.
+
+    Returns:
+        float32 [N, D * (2 L + 1)], the transpose of a contiguous array.
     """
     f = features.T
     out = np.empty((2 * octaves + 1, *f.shape), np.float32)
     out[0] = f
     if octaves:
-        # Reduced to |r| <= 1/2 before multiplying by pi, as exact as float32 allows.
+        # Features are reduced to |r| <= 1/2 before multiplying by pi, to be as exact as float32 is.
         turns = np.rint(f)
         half = turns / 2
         sign = 1 - 4 * np.abs(half - np.rint(half))  # -1 for odd turns
@@ -146,7 +161,7 @@ def encode_features(features: Floats, octaves: int) -> Floats:
 
 
 def pack(network: Network) -> dict[str, Any]:
-    """The fields of NETW."""
+    """Encodes a network as the fields of NETW."""
     s = network.shape
     parts = []
     for weight in network.weights:
@@ -163,10 +178,15 @@ def pack(network: Network) -> dict[str, Any]:
 
 
 def unpack(fields: Mapping[str, Any], where: str = "chunk NETW") -> Network:
-    """Inverse of `pack`.
+    """Decodes a network.
+
+    Args:
+        fields: Values of NETW.
+        where: Name of the chunk in error messages.
 
     Raises:
-        FormatError: Corrupt streams, wrong lengths, steps or biases that are not finite.
+        FormatError: A stream is corrupt or has a wrong length, a step is not positive, or a step or
+            bias is not finite.
     """
     shape = NetShape(*(fields[k] for k in ("dim", "octaves", "hidden", "depth", "channels")))
     steps = read_halves(fields["steps"], shape.rows, where, "TEX-16", positive=True)
@@ -194,10 +214,20 @@ def unpack(fields: Mapping[str, Any], where: str = "chunk NETW") -> Network:
 def read_halves(
     data: bytes, count: int, where: str, rule: str, positive: bool = False
 ) -> NDArray[np.float16]:
-    """`count` finite float16 values, as `rule` asks for.
+    """Reads and checks little-endian float16 values.
+
+    Args:
+        data: Bytes of the values.
+        count: Number of values that there must be.
+        where: Name of the chunk in error messages.
+        rule: Id of the rule that wrong values break.
+        positive: Whether the values must be positive.
+
+    Returns:
+        float16 [count].
 
     Raises:
-        FormatError: Wrong length, a value that is not finite, or not positive where it must be.
+        FormatError: `data` has a wrong length, or a value is not finite or not positive.
     """
     if len(data) != 2 * count:
         raise FormatError(

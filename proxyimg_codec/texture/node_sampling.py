@@ -1,9 +1,9 @@
 """Node sampling: features from the nodes of a mesh and from the boundary (ProxyImg, literally).
 
-The *local* feature of a point is the plane sampled at the three nodes of its triangle, combined
-barycentrically. The *global* feature is the plane sampled at one anchor a boundary segment,
-combined by inverse squared distance. The network gets both, one of them, or neither: see the
-constants below.
+The *local* feature of a point is the barycentric mean of the plane sampled at the three nodes of
+its triangle. The *global* feature is the mean of the plane sampled at the anchors, one for each
+boundary segment, weighted by inverse squared distance. The constants below say which of them the
+network gets.
 """
 
 from __future__ import annotations
@@ -16,24 +16,27 @@ from .implicit import Box, ImplicitTexture
 from .network import Floats
 
 DIRECT, BOTH, LOCAL, GLOBAL = range(4)
-"""How a layer's features are found: at the point itself, or local and global, local, global."""
+"""Sampling modes: at the point itself; local and global, local, or global feature."""
 
 NEAR = 1e-4
-"""Squared distance in canvas px^2 below which an anchor is no nearer; keeps weights finite."""
+"""Least squared distance to an anchor that counts, in canvas px^2; keeps weights finite."""
 
 CHUNK = 1 << 12
-"""Points handled at a time, so that what is summed stays in the cache."""
+"""Points handled at a time, so that sums stay in the processor cache."""
 
 Reals = NDArray[np.float64]
 
 
 def anchors(boundary: Boundary | None, size: tuple[int, int]) -> Reals:
-    """Boundary points [S, 2] in canvas pixels: the middle (t = 1/2) of every segment.
+    """Anchors of a layer: the point at t = 1/2 of every boundary segment.
 
     Args:
-        boundary: At rest; None has the four sides of the canvas as its segments: top, right,
-            bottom, left.
-        size: Width and height of the canvas.
+        boundary: Boundary at rest. None has the four sides of the canvas as its segments: top,
+            right, bottom, left.
+        size: Width and height of the canvas in pixels.
+
+    Returns:
+        float64 [S, 2] in canvas pixels.
     """
     if boundary is None:
         w, h = size
@@ -56,22 +59,24 @@ def features(
     weights: Reals,
     points: Reals,
 ) -> Floats:
-    """Features of n points; those of a point do not depend on which others are asked for.
+    """Features of n points; those of a point do not depend on the other points.
+
+    `GLOBAL` does not use `nodes`, `faces`, `face` and `weights`; `LOCAL` does not use `anchors` and
+    `points`.
 
     Args:
-        texture: The plane.
-        box: The layer's rectangle, over which the plane is stretched.
+        texture: The plane of codes.
+        box: Rectangle of the layer, over which the plane is stretched.
         sampling: `BOTH`, `LOCAL` or `GLOBAL`.
-        nodes: [N, 2] rest positions in canvas pixels. Not used by `GLOBAL`, nor are `faces`,
-            `face` and `weights`.
-        faces: [F, 3] nodes of each triangle.
-        anchors: [S, 2] boundary points in canvas pixels. Not used by `LOCAL`.
-        face: [n] triangle of each point.
-        weights: [n, 3] its barycentric weights there.
-        points: [n, 2] rest positions in canvas pixels. Not used by `LOCAL`.
+        nodes: float64 [N, 2] rest positions of the nodes in canvas pixels.
+        faces: int32 [F, 3] nodes of each face.
+        anchors: float64 [S, 2] anchors in canvas pixels.
+        face: int64 [n] face of each point.
+        weights: float64 [n, 3] barycentric weights of each point in its face.
+        points: float64 [n, 2] texture points in canvas pixels.
 
     Returns:
-        [n, D] or, for `BOTH`, [n, 2 D]: local, then global.
+        float32 [n, D] or, for `BOTH`, [n, 2 D]: local, then global features.
     """
     dim, parts = len(texture.steps), []
     if sampling != GLOBAL:
@@ -89,18 +94,18 @@ def features(
 
 
 def at(texture: ImplicitTexture, box: Box, points: Reals) -> Reals:
-    """The plane sampled at points [N, 2]: [N, D]."""
+    """Features float64 [N, D] of the plane at points [N, 2] in canvas pixels."""
     return texture.features(texture.taps(points[:, 0], points[:, 1], box)).astype(np.float64)
 
 
 def _local(corners: Reals, weights: Reals) -> Reals:
-    """Combines the features [n, 3, D] of the corners."""
+    """Combines features [n, 3, D] of three corners with weights [n, 3] to [n, D]."""
     w = weights[:, :, None]
     return w[:, 0] * corners[:, 0] + w[:, 1] * corners[:, 1] + w[:, 2] * corners[:, 2]
 
 
 def _global(values: Reals, anchors: Reals, points: Reals) -> Reals:
-    """Combines the features [S, D] of the anchors; term by term, so that sums are repeatable."""
+    """Combines features [S, D] of anchors to [n, D], term by term, so that sums are repeatable."""
     x, y = np.ascontiguousarray(points.T)
     total = np.zeros(len(x))
     out = np.zeros((values.shape[1], len(x)))

@@ -1,4 +1,11 @@
-"""Which samples of a view show, and which tell what is hidden, where boundaries at rest say it."""
+"""Visible and trusted samples of a view that is cut by boundaries [PYR-40, PYR-41, PYR-46].
+
+A view is the part of a raster that a layer shows. The raster is the flat picture, so only a part of
+it belongs to the layer: the view is *cut* by the layer's own boundary and by those of layers in
+front. The remaining samples *show*: they are used as they are. Samples on a boundary are mixtures
+of two layers. The samples at some distance from all cuts are *trusted*: hidden ones are filled from
+these.
+"""
 
 from __future__ import annotations
 
@@ -15,21 +22,21 @@ from ..geometry.coverage import FULL, coverage, to_output
 from .implicit import Box
 
 BAND = 1 << 18
-"""Pixels whose coverage is computed at a time; bounds memory."""
+"""Pixels whose coverage is computed at a time, which bounds memory."""
 
 REACH = 2
-"""Samples that a boundary spoils on either side of itself, by blur and by coding."""
+"""Distance in samples up to which a boundary mixes colours, by blur and by coding."""
 
 Samples = NDArray[np.bool_]
 
 
 class Moved(NamedTuple):
-    """What no longer lies to a view as it did when its samples were mixed.
+    """Neighbours of a view that have moved relative to it since it was cut.
 
     Attributes:
-        fronts: Those of `Occlusion.fronts` that do not.
-        behind: Boundaries of what lay behind, front to back, None being everywhere, each with
-            whether it still lies as it did; empty if all do.
+        fronts: Boundaries among `Occlusion.fronts` that have moved or are gone.
+        behind: Layers behind that show the same raster, front to back: the boundary at rest, None
+            for the whole canvas, and whether it still rests in its place. Empty if all do.
     """
 
     fronts: frozenset[Boundary] = frozenset()
@@ -37,23 +44,24 @@ class Moved(NamedTuple):
 
 
 ALL_IN_PLACE = Moved()
-"""All is as it was."""
+"""Value for a view of which no neighbour has moved."""
 
 ALL_REMOVED = ((None, False),)
-"""`Moved.behind` if nothing is left of what lay behind."""
+"""Value of `Moved.behind` that counts everything behind as moved."""
 
 
 @dataclass(frozen=True, eq=False)
 class Occlusion:
-    """What boundaries leave of a view whose samples lie on the canvas pixels of a box.
+    """Cuts of a view, whose samples lie on the canvas pixels of a box.
 
-    Boundaries are those of layers when the view was made: what becomes of these changes nothing.
+    The boundaries are those that the layers had when the view was made. Later changes of the layers
+    do not change them.
 
     Attributes:
-        own: The layer's boundary, outside of which it has no samples; None cuts nothing off.
-        fronts: Boundaries of layers in front of it, inside of which it has no samples.
-        box: x, y, width, height of the view in canvas pixels.
-        within: The samples that a mask leaves, bool [height, width]; None = all.
+        own: Boundary of the layer itself, which cuts off everything outside; None cuts nothing.
+        fronts: Boundaries of layers in front, which cut off everything inside.
+        box: Rectangle of the view: x, y, width, height in canvas pixels.
+        within: bool [height, width], True for the samples in the mask of the view; None = all.
     """
 
     own: Boundary | None
@@ -69,14 +77,17 @@ class Occlusion:
         box: Box,
         within: Samples | None = None,
     ) -> Occlusion | None:
-        """The cuts by layers `numbers`, of a view that layer `layer` shows in `box`.
+        """Makes the cuts of a view from the numbers of the layers that cut it.
 
         Args:
-            numbers: Layers with a boundary, `layer` itself or in front of it; empty gives None.
-            layer: Number of the layer.
-            boundaries: Of all layers, back to front.
-            box: Where the view lies.
-            within: The samples that a mask leaves; None = all.
+            numbers: Ascending numbers of layers with a boundary: `layer` itself, or in front of it.
+            layer: Number of the layer that shows the view.
+            boundaries: Boundaries of all layers at rest, back to front.
+            box: Rectangle of the view in canvas pixels.
+            within: bool [height, width], True for the samples in the mask; None = all.
+
+        Returns:
+            The cuts; None if `numbers` is empty.
         """
         if not numbers:
             return None
@@ -85,7 +96,16 @@ class Occlusion:
         return Occlusion(own, tuple(b for b in fronts if b is not None), box, within)
 
     def numbers(self, layer: int, boundaries: Sequence[Boundary | None]) -> list[int] | None:
-        """Ascending numbers for `of`; None if a boundary is not, or no longer, where it was."""
+        """Finds the numbers of the layers that cut the view; the inverse of `of`.
+
+        Args:
+            layer: Number of the layer that shows the view.
+            boundaries: Boundaries of all layers at rest, back to front.
+
+        Returns:
+            The ascending numbers; None if a boundary in `fronts` no longer belongs to a layer in
+            front, or `own` no longer to the layer itself.
+        """
         found = self._matched(layer, boundaries)
         if len(found) < len({*self.fronts}) or not self._owns(boundaries[layer]):
             return None
@@ -94,7 +114,15 @@ class Occlusion:
     def removed(
         self, layer: int, boundaries: Sequence[Boundary | None]
     ) -> tuple[Moved, Occlusion | None]:
-        """What is gone of the boundaries, and the cuts by those that are left, if any."""
+        """Separates the cuts by boundaries that no longer belong to a layer from the others.
+
+        Args:
+            layer: Number of the layer that shows the view.
+            boundaries: Boundaries of all layers at rest, back to front.
+
+        Returns:
+            The boundaries that are gone, and the cuts that are left, or None.
+        """
         found = self._matched(layer, boundaries)
         owns = self._owns(boundaries[layer])
         gone = Moved(
@@ -112,13 +140,13 @@ class Occlusion:
         still: Sequence[bool],
         raster: Sequence[bool],
     ) -> Moved:
-        """What has moved away from a view that layer `layer` was cut for.
+        """Finds the neighbours that have moved relative to the layer that shows the view.
 
         Args:
-            layer: Number of the layer.
-            boundaries: Of all layers, back to front.
-            still: Whether each lies to who shows the view as it did at rest.
-            raster: Whether each shows something of the same raster.
+            layer: Number of the layer for which the view was cut.
+            boundaries: Boundaries of all layers at rest, back to front.
+            still: For each layer, whether it rests on the layer that shows the view (`Pose.still`).
+            raster: For each layer, whether it shows a part of the same raster.
         """
         found = self._matched(layer, boundaries)
         fronts = (f for f in self.fronts if f not in found or not still[found[f]])
@@ -131,14 +159,17 @@ class Occlusion:
         return Moved(frozenset(fronts), behind)
 
     def _owns(self, boundary: Boundary | None) -> bool:
-        """Whether the layer's own boundary, if it cuts, is this one."""
+        """Whether `own`, if there is one, equals the present boundary of the layer."""
         return self.own is None or _equal(self.own, boundary)
 
     def _matched(self, layer: int, boundaries: Sequence[Boundary | None]) -> dict[Boundary, int]:
-        """The layers in front of layer `layer` that have the boundaries of `fronts`.
+        """Finds layers in front of layer `layer` that have the boundaries in `fronts`.
 
-        Of equal boundaries the hindmost is named, those that are not only equal but the same
-        object before others.
+        A layer with the same boundary object is preferred to one with an equal boundary, and among
+        several the rearmost.
+
+        Returns:
+            Numbers of the layers by boundary, for the boundaries that were found.
         """
         found: dict[Boundary, int] = {}
         wanted = set(self.fronts)
@@ -155,10 +186,11 @@ class Occlusion:
 
     @cached_property
     def shown(self) -> Samples:
-        """The samples that are taken as they are, bool [height, width]; `within` if none would be.
+        """Samples that show if nothing has moved, bool [height, width] [PYR-41].
 
-        Those that no front covers wholly, and of which `own` covers something: all that the layer
-        contributes to where nothing was moved, mixed with what is beside it or not.
+        They are in the mask, no boundary in front covers them fully, and the layer's own covers
+        them at least in part. So the layer contributes to each. If there are none, all in the mask
+        show.
         """
         shown = self._left(ALL_IN_PLACE)
         if shown.any():
@@ -167,28 +199,30 @@ class Occlusion:
 
     @cached_property
     def trusted(self) -> Samples:
-        """The samples that others are filled from, bool [height, width]; `shown` if none would be.
+        """Samples that hidden ones are filled from, bool [height, width] [PYR-41].
 
-        Those further than `REACH` from samples that a front covers, or `own` does not, in part.
+        They show, and no sample within `REACH` of them is cut even in part. If there are none,
+        those that show are trusted.
         """
         return self.kept(self.everything)
 
     @property
     def everything(self) -> Moved:
-        """All that cuts, as if it had moved."""
+        """Value of `Moved` as if everything that cuts the view had moved."""
         return Moved(frozenset(self.fronts), ALL_REMOVED)
 
     def kept(self, moved: Moved) -> Samples:
-        """The samples to take as they are, bool [height, width]; `shown` if none would be.
+        """Samples that show when neighbours have moved, bool [height, width] [PYR-46].
 
-        Near what has moved they are the trusted ones: mixed ones fit nothing that is left there.
+        Near a boundary that has moved, samples are mixtures with a colour that is no longer beside
+        them. So only trusted ones show there. If there are none at all, it is `shown`.
         """
         return _kept(self, moved)
 
     def _left(self, moved: Moved) -> Samples:
-        """The samples that are not cut off as a whole, nor near a cut by what has moved.
+        """Samples that are not cut off fully, and not near a cut by a neighbour that has moved.
 
-        Unlike what is made of them, they may be none.
+        There may be none.
         """
         _, _, width, height = self.box
         left, clear = np.ones((2, height, width), np.bool_)
@@ -207,7 +241,7 @@ class Occlusion:
         return left & _eroded(clear)
 
     def _bared(self, moved: Moved) -> Samples:
-        """The samples of which the first thing behind has moved; that may cover them in part."""
+        """Samples behind which a layer has moved that no resting one in between covers fully."""
         _, _, width, height = self.box
         bared, hidden = np.zeros((2, height, width), np.bool_)
         for boundary, rests in moved.behind:
@@ -219,7 +253,7 @@ class Occlusion:
         return bared
 
     def _covered(self, boundary: Boundary | None) -> tuple[Samples, Samples]:
-        """The samples of which a boundary covers something, and all."""
+        """Samples that a boundary covers at least in part, and samples that it covers fully."""
         _, _, width, height = self.box
         some, whole = np.full((2, height, width), boundary is None)
         if boundary is not None:
@@ -230,7 +264,7 @@ class Occlusion:
     def _coverage(
         self, boundary: Boundary
     ) -> Iterator[tuple[tuple[slice, slice], NDArray[np.int32]]]:
-        """Parts of the box that a boundary may cover, and the coverage of their pixels."""
+        """Yields parts of the box that a boundary may cover, with the coverage of their pixels."""
         x, y, width, height = self.box
         left, top, right, bottom = boundary.bounds()
         x0, x1 = max(left, x), min(right, x + width)
@@ -250,13 +284,13 @@ class Occlusion:
 
 @lru_cache(maxsize=64)
 def _kept(cuts: Occlusion, moved: Moved) -> Samples:
-    """`Occlusion.kept`; what has moved often stays the same while it is dragged."""
+    """Computes `Occlusion.kept`; cached, as `moved` stays the same while a layer is dragged."""
     kept = cuts._left(moved)
     return kept if kept.any() else cuts.shown
 
 
 def _eroded(samples: Samples) -> Samples:
-    """Those of which no sample within `REACH`, across and down, is missing."""
+    """Mask eroded by `REACH` across and down; samples outside the array count as True."""
     for axis, size in enumerate(samples.shape):
         beside = [(REACH, REACH) if k == axis else (0, 0) for k in (0, 1)]
         padded = np.pad(samples, beside, constant_values=True)
@@ -266,7 +300,7 @@ def _eroded(samples: Samples) -> Samples:
 
 
 def _equal(one: Boundary | None, other: Boundary | None) -> bool:
-    """Whether boundaries are stored alike."""
+    """Whether two boundaries are the same, or have equal units and control points."""
     if one is other:
         return True
     return (

@@ -1,8 +1,8 @@
-"""The pyramid texture: a view of a part of decoded planes, sampled by an interpolating kernel.
+"""Pyramid texture: a view of a part of a raster, sampled by an interpolating kernel.
 
-Several layers may show parts of the same planes: a mask, and boundaries that cut, tell the samples
-that each shows. Others are filled smoothly, when they are first asked for, from those that can be
-trusted: with a mask all that are shown, with cuts those that no other layer is mixed into.
+Several layers may be views of the same raster. A mask, and boundaries that cut, decide the samples
+that show in each. Hidden samples are filled smoothly, when they are first needed, from trusted
+ones: without cuts from all that show, with cuts from those that no other layer is mixed into.
 """
 
 from __future__ import annotations
@@ -26,28 +26,29 @@ from .occlusion import ALL_IN_PLACE, Moved, Occlusion, Samples
 from .planes import Planes
 
 FILL_ONE = 255 << FRACTION_BITS
-"""The sample 1.0 as the fill counts it."""
+"""Integer that stands for the sample 1.0 in the fill."""
 
 TAPS = 4
-"""Samples across and down that a point between samples is interpolated from."""
+"""Number of samples, across and down, that a point is interpolated from."""
 
 CHUNK = 4096
-"""Points interpolated at a time, so that their samples stay in the cache."""
+"""Points interpolated at a time, so that their samples stay in the processor cache."""
 
 
 @dataclass(frozen=True, eq=False)
 class PyramidTexture:
-    """A view of planes.
+    """View of the raster of some planes.
 
     Attributes:
-        planes: The colours, straight if there is `alpha`; 1 component is grey.
-        alpha: Planes of the same size with the alpha, or None for opaque.
-        part: x, y, width, height in samples of what is shown, stretched over the layer's box.
-        cell: A cell of `mask` has a side of 2**cell samples.
-        mask: bool [rows, columns], cells from the corner of `part` whose samples are shown; None =
-            all.
-        cuts: What takes samples from these, or None; it knows the mask.
-        network: None: none of the file.
+        planes: Planes of the colour, which is straight if there is `alpha`; 1 component is grey.
+        alpha: Planes of the alpha, of the same size; None if the view is opaque.
+        part: Part of the raster that is stretched over the box of the layer: x, y, width, height in
+            samples.
+        cell: Base-2 logarithm of the side of a cell of `mask`, in samples.
+        mask: bool [rows, columns], True for the cells, from the corner of `part` on, that belong to
+            the layer; None = all.
+        cuts: Boundaries that cut the view, together with the mask; or None.
+        network: Always None: no network of the file is needed.
     """
 
     planes: Planes
@@ -60,27 +61,38 @@ class PyramidTexture:
 
     @property
     def arrays(self) -> tuple[NDArray[Any], ...]:
-        """What it is made of beside planes."""
+        """Arrays of the texture, without those of its planes."""
         return () if self.mask is None else (self.mask,)
 
     def channels(self, networks: Sequence[Network]) -> int:
-        """3, or 4 with alpha; `networks` are those of the file."""
+        """Number of channels: 3, or 4 with alpha; `networks` is not used."""
         return 3 if self.alpha is None else 4
 
     @property
     def sources(self) -> tuple[Planes, ...]:
-        """The planes it needs: colour, and alpha if there is any."""
+        """Planes that the view needs: those of colour, and of alpha if there is any."""
         return (self.planes,) if self.alpha is None else (self.planes, self.alpha)
 
     @cached_property
     def coded_mask(self) -> bytes:
-        """The mask as it was read, or coded anew; empty for all samples."""
+        """Coded mask: the one that was read, otherwise a newly coded one; empty for all samples."""
         if self.mask is None or self.mask.all():
             return b""
         return arrays.encode(self.mask[None].astype(np.int64), 1, np.ones(self.mask.shape, bool))
 
     def masked(self, moved: Moved, cuts: Occlusion | None = None) -> PyramidTexture:
-        """This view with other cuts, and a mask of 2x2 samples: those that all are kept."""
+        """Replaces cuts by a mask.
+
+        The mask has cells of 2x2 samples, and holds those whose samples all show when neighbours
+        have moved; if there are none, those of which any sample shows.
+
+        Args:
+            moved: Neighbours that count as moved.
+            cuts: Cuts that the new view keeps, or None.
+
+        Returns:
+            The new view; this view itself if it has no cuts.
+        """
         if self.cuts is None:
             return self
         kept = self.cuts.kept(moved)
@@ -97,7 +109,12 @@ class PyramidTexture:
         return replace(self, cell=1, mask=mask, cuts=cuts)
 
     def fields(self, numbers: Mapping[Planes, int], cuts: Sequence[int] = ()) -> dict[str, Any]:
-        """The fields of TEXR, where planes have `numbers`, and `cuts` are those of layers."""
+        """Encodes the view as the fields of TEXR.
+
+        Args:
+            numbers: Numbers of the planes in the file.
+            cuts: Ascending numbers of the layers whose boundaries cut the view.
+        """
         mask = self.coded_mask
         return {
             "coder": texr.PYRAMID,
@@ -111,7 +128,7 @@ class PyramidTexture:
 
     @cached_property
     def shown(self) -> Samples | None:
-        """The samples of the part that are taken as they are, bool [height, width]; None = all."""
+        """Samples of the part that show if nothing has moved, bool [height, width]; None = all."""
         if self.cuts is not None:
             shown = self.cuts.shown
         elif self.mask is not None:
@@ -121,12 +138,15 @@ class PyramidTexture:
         return None if shown.all() else shown
 
     def kept(self, moved: Moved) -> Samples | None:
-        """Those of `shown` that still fit once something has moved; None = all."""
+        """Samples of the part that show when neighbours moved, bool [height, width]; None = all."""
         return self.shown if self.cuts is None or moved == ALL_IN_PLACE else self.cuts.kept(moved)
 
     @cached_property
     def filled(self) -> NDArray[np.uint16]:
-        """The part in 1/`FILL_ONE` [height * width, components, alpha last], from trusted samples.
+        """Samples of the part, filled by diffusion from the trusted ones.
+
+        uint16 [height * width, C] in 1/`FILL_ONE`, where C counts the components of colour, and
+        alpha as the last one. Only defined if not all samples show.
 
         Raises:
             FormatError: The planes are corrupt.
@@ -148,17 +168,20 @@ class PyramidTexture:
         moved: Moved = ALL_IN_PLACE,
         native: bool = False,
     ) -> Floats:
-        """Colours [N, `channels`] at canvas points x, y [N], premultiplied, not clamped.
+        """Interpolates the texture at points.
 
-        Points on samples take these as they are; others are interpolated by cubic convolution with
-        a = -1/2 (Keys 1981, "Cubic Convolution Interpolation for Digital Image Processing").
+        A point that lies on a sample takes its value. Others are interpolated by cubic convolution
+        with a = -1/2 (Keys 1981, "Cubic Convolution Interpolation for Digital Image Processing").
 
         Args:
-            x: Canvas x of the points.
-            y: Canvas y.
-            box: The layer's rectangle.
-            moved: What `cuts` have lost.
+            x: float64 [N] x of the texture points in canvas pixels.
+            y: float64 [N] y of the texture points.
+            box: Rectangle of the layer in canvas pixels.
+            moved: Neighbours that have moved relative to the layer.
             native: Whether to use the compiled kernel.
+
+        Returns:
+            float32 [N, `channels`] premultiplied colour, and alpha if there is any, not clamped.
 
         Raises:
             FormatError: The planes are corrupt.
@@ -178,7 +201,18 @@ class PyramidTexture:
         return out
 
     def padded(self, moved: Moved) -> Floats:
-        """All premultiplied samples, with the edge repeated once before and twice behind."""
+        """All samples of the part, premultiplied and filled, with a border for interpolation.
+
+        Args:
+            moved: Neighbours that have moved relative to the layer.
+
+        Returns:
+            float32 [height + 3, width + 3, `channels`]; the edge is repeated once before and twice
+            behind.
+
+        Raises:
+            FormatError: The planes are corrupt.
+        """
         found = self._last.get(moved)
         if found is None:
             _, _, width, height = self.part
@@ -189,7 +223,7 @@ class PyramidTexture:
             found = np.empty((len(rows), len(columns), self.channels(())), np.float32)
             for row, out in zip(rows, found, strict=True):
                 out[:] = self._samples(np.full_like(columns, row), columns, kept)
-            # What has moved stays the same while a layer is dragged: the last one is enough.
+            # `moved` stays the same while a layer is dragged, so keeping the last one is enough.
             self._last.clear()
             self._last[moved] = found
         return found
@@ -201,7 +235,7 @@ class PyramidTexture:
     def _samples(
         self, row: NDArray[np.intp], column: NDArray[np.intp], kept: Samples | None
     ) -> Floats:
-        """Premultiplied samples [N, `channels`] of rows and columns of the part."""
+        """Premultiplied samples [N, `channels`] at rows and columns [N]; hidden ones are filled."""
         x, y, width, _ = self.part
         parts = []
         for planes in self.sources:
@@ -225,13 +259,13 @@ Texture = ImplicitTexture | PyramidTexture
 
 
 def _samples(mask: NDArray[np.bool_], cell: int, part: Box) -> Samples:
-    """The samples of a part, bool [height, width], whose cells are in a mask."""
+    """Samples of a part, bool [height, width], that lie in the cells of a mask."""
     _, _, width, height = part
     return mask.repeat(1 << cell, 0)[:height].repeat(1 << cell, 1)[:, :width]
 
 
 def _interpolated(padded: Floats, first: NDArray[np.intp], fx: Floats, fy: Floats) -> Floats:
-    """Colours [n, C] at fractions fx, fy [n] from the four by four samples after `first` [n]."""
+    """Colours [n, C] at fractions fx, fy [n] of the 4x4 samples that begin with `first` [n]."""
     samples = padded.reshape(-1, padded.shape[2])
     across, down = _weights(fx), _weights(fy)
     total = np.zeros((len(first), samples.shape[1]), np.float32)
@@ -246,7 +280,7 @@ def _interpolated(padded: Floats, first: NDArray[np.intp], fx: Floats, fy: Float
 def _position(
     points: NDArray[np.float64], start: int, extent: int, samples: int
 ) -> tuple[NDArray[np.intp], Floats]:
-    """Samples before points on one axis, and fractions; the samples share the extent."""
+    """Index of the sample before each point along one axis, and the fraction to the next sample."""
     at = (points - start) * (samples / extent)
     at -= 0.5
     np.clip(at, 0, samples - 1, out=at)
@@ -256,9 +290,9 @@ def _position(
 
 
 def _weights(f: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Weights of the samples before, at, after and after that for fractions f [N]; their sum is 1.
+    """Weights of four neighbouring samples for points at the fractions f [N] after the second one.
 
-    At f = 0 they are exactly 0, 1, 0, 0.
+    They add up to 1. At f = 0 they are exactly 0, 1, 0, 0.
     """
     half = np.float32(0.5)
     return (
@@ -275,7 +309,13 @@ def unpack(
     where: str = "chunk TEXR",
     cuts: Occlusion | None = None,
 ) -> PyramidTexture:
-    """Inverse of `PyramidTexture.fields`; `planes` are those of the file.
+    """Decodes a pyramid texture.
+
+    Args:
+        fields: Values of TEXR.
+        planes: All planes of the file.
+        where: Name of the chunk in error messages.
+        cuts: Boundaries that cut the view, without the mask; or None.
 
     Raises:
         FormatError: The mask is corrupt, full or empty.

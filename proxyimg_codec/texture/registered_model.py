@@ -1,8 +1,8 @@
-"""The registered pyramid models: weights that are part of the specification, not of a file.
+"""Registered pyramid models: weights that are part of the specification, not of a file.
 
-A model is one file of `models/`: a fixed sequence of arrays, each of whole numbers in units of a
-power of two (spec chapter 8). `Context` decides probabilities, in integers; `Synthesis` gives
-colour, in floating point.
+A model is one file in `models/`: a fixed sequence of arrays of integers, each in units of a power
+of two (spec chapter 8). The `Context` networks predict probabilities in integer arithmetic; the
+`Synthesis` networks compute colour in floating point.
 """
 
 from __future__ import annotations
@@ -21,34 +21,40 @@ from .network import Floats
 
 MAGIC = b"PXIMODL1"
 LEVEL_SETS = 4
-"""Weights of levels 1, 2, 3, and of all coarser ones."""
+"""Number of sets of weights: for levels 1, 2, 3, and for all coarser levels."""
 
 REGISTERED = {1: "91e24c9aca7764cc60f13d481e139d4a1ef71bbe6cffe0b1f3850315bb2d0934"}
-"""SHA-256 of the file of each model."""
+"""SHA-256 of the file of each model, by registered number."""
 
 STEP_ORIGIN = 293
-"""Networks see the step as (step - STEP_ORIGIN) / 128."""
+"""Origin of the quantization step as an input of networks: (step - STEP_ORIGIN) / 128."""
 
 CAUSAL = tuple((dy, dx) for dy in (-2, -1, 0) for dx in (-2, -1, 0, 1, 2) if dy < 0 or dx < 0)
-"""The neighbours, coded before, that the context of a latent sees."""
+"""Offsets (dy, dx) of the neighbours, coded before, that are inputs of the context network."""
 
 
 class Array(NamedTuple):
-    """An array of a model: `values` in units of 2**exponent."""
+    """Array of a model.
+
+    Attributes:
+        values: Integers in units of 2**exponent.
+        exponent: Exponent of the unit.
+    """
 
     values: NDArray[np.int32]
     exponent: int
 
     @property
     def floats(self) -> Floats:
-        """The array as float32; exact."""
+        """Array as float32, which is exact."""
         return (self.values * 2.0**self.exponent).astype(np.float32)
 
 
 class Context(NamedTuple):
-    """Context network of a level; C hidden units. Weights are [out, in, ...], biases [out].
+    """Weights of the context network of a level, with C hidden units.
 
-    Biases are in units of 1/32 of the unit of their weights; `first_by_step` besides in 1/256.
+    Weights are [out, in, ...], biases [out]. Biases are in 1/32 of the unit of their weights;
+    `first_by_step` is in 1/256 of that.
     """
 
     first: Array  # [C, 12, 3, 3]
@@ -68,9 +74,9 @@ class Context(NamedTuple):
 
 
 class Synthesis(NamedTuple):
-    """Synthesis of a level; H hidden units."""
+    """Weights of the synthesis network of a level, with H hidden units."""
 
-    delta: Array  # [12, 12, 5, 5] what is added to the CDF 9/7 wavelet
+    delta: Array  # [12, 12, 5, 5], added to the weights of the CDF 9/7 wavelet
     gain: Array  # [9]
     gain_by_step: Array  # [9]
     first: Array  # [H, 12, 3, 3]
@@ -83,7 +89,7 @@ class Synthesis(NamedTuple):
 
 
 class Model(NamedTuple):
-    """All that a decoder needs; weights of level l are those at min(l, 4) - 1."""
+    """Weights of a registered model; those of level l have the index min(l, 4) - 1."""
 
     to_colour: Array  # [3, 3]
     context: tuple[Context, ...]
@@ -91,11 +97,16 @@ class Model(NamedTuple):
 
 
 WIDE = ("bias", "by_step", "gain", "to_colour")
-"""Arrays whose names have these are int32 in the file; the others are int8."""
+"""Parts of the names of the arrays that are int32 in the file; the others are int8."""
 
 
 def layout(hidden: int, context: int) -> list[tuple[str, tuple[int, ...], str]]:
-    """Names, shapes and types of all arrays in the order of the file."""
+    """Names, shapes and types of all arrays in the order of the file.
+
+    Args:
+        hidden: Hidden units of the synthesis networks.
+        context: Hidden units of the context networks.
+    """
     c, h = context, hidden
     ctx = [
         (c, 12, 3, 3), (c,), (c,), (c, c, 3, 3), (c,), (c, 18, 12), (c, c), (c,),
@@ -114,7 +125,13 @@ def layout(hidden: int, context: int) -> list[tuple[str, tuple[int, ...], str]]:
 
 
 def pack(arrays: dict[str, Array], hidden: int, context: int) -> bytes:
-    """The file of a model."""
+    """Packs a model to the bytes of its file.
+
+    Args:
+        arrays: All arrays by their names in `layout`.
+        hidden: Hidden units of the synthesis networks.
+        context: Hidden units of the context networks.
+    """
     out = [MAGIC, struct.pack("<HH", hidden, context)]
     for name, shape, kind in layout(hidden, context):
         values, exponent = arrays[name]
@@ -125,7 +142,7 @@ def pack(arrays: dict[str, Array], hidden: int, context: int) -> bytes:
 
 
 def unpack(data: bytes) -> Model:
-    """Inverse of `pack`."""
+    """Unpacks the file of a model, which must be valid."""
     assert data[:8] == MAGIC
     hidden, context = struct.unpack_from("<HH", data, 8)
     at, arrays = 12, []
@@ -146,10 +163,10 @@ def unpack(data: bytes) -> Model:
 
 @functools.cache
 def registered(number: int) -> Model:
-    """The model with a registered number.
+    """Loads the model with a registered number, once.
 
     Raises:
-        UnsupportedError: This program does not have it.
+        UnsupportedError: This program does not have the model, or its file is damaged.
     """
     if number not in REGISTERED:
         raise UnsupportedError(f"chunk PLAN: pyramid model {number} is not known; update "

@@ -1,4 +1,4 @@
-"""The synthesis of the pyramid coder: latents to samples, in floating point."""
+"""Synthesis of the pyramid coder: from latents to samples, in floating point."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ _LOW = (0.788485616406, 0.418092273222, -0.040689417609, -0.064538882629)
 _HIGH = (0.852698679009, -0.377402855613, -0.110624404418, 0.023849465020, 0.037828455507)
 
 BANDS = ((0, 1), (1, 0), (1, 1))
-"""(vertical, horizontal), 1 = high pass, of the three latents that a colour has at a place."""
+"""Bands of the three latents of a colour at a position: (vertical, horizontal), 1 = high pass."""
 
 
 @functools.cache
 def wavelet() -> NDArray[np.float64]:
-    """Synthesis weights [12 cells, 12 planes, 5, 5] of the CDF 9/7 wavelet.
+    """Synthesis weights of the CDF 9/7 wavelet as a convolution, float64 [12, 12, 5, 5].
 
-    Cell 4 * colour + 2 * y + x is a sample of the 2 x 2 that a place gives. Plane c is the low band
-    of colour c, plane 3 + 3 * band + colour a high one.
+    Output 4 * colour + 2 * y + x is sample (y, x) of the 2 x 2 samples that a position gives. Input
+    c is the low band of colour c; input 3 + 3 * band + colour is a high band.
     """
     axis = np.zeros((2, 2, 5))  # [band, phase, tap]
     for phase in range(2):
@@ -52,7 +52,17 @@ def _planes(colour: int) -> list[tuple[int, tuple[int, int]]]:
 
 
 def samples(model: Model, latents: Sequence[Ints], lowest: Ints, step: int) -> Floats:
-    """Samples [H, W, 3] in 0..255, not clipped, of latents 1.. [9, h, w] and the lowest plane."""
+    """Computes the samples of a raster from its latents.
+
+    Args:
+        model: The registered model.
+        latents: int32 [9, h, w] latents of each level, from level 1, the finest, on.
+        lowest: int32 [3, h, w] lowest planes.
+        step: Quantization step, as in PLAN.
+
+    Returns:
+        float32 [H, W, 3] samples in 0..255, not clipped.
+    """
     out = np.ascontiguousarray(lowest.transpose(1, 2, 0), np.float32)
     for number in range(len(latents), 0, -1):
         weights = model.synthesis[min(number, len(model.synthesis)) - 1]
@@ -64,7 +74,7 @@ def samples(model: Model, latents: Sequence[Ints], lowest: Ints, step: int) -> F
 
 
 def _finer(weights: Synthesis, low: Floats, latents: Ints, step: int) -> Floats:
-    """The next finer planes [2h, 2w, 3]."""
+    """Next finer planes float32 [2 h, 2 w, 3] from planes [h, w, 3] and latents [9, h, w]."""
     t = np.float32((step - STEP_ORIGIN) / 128)
     gain = np.exp(weights.gain.floats + weights.gain_by_step.floats * t)
     bias = weights.first_bias.floats + weights.first_by_step.floats * t
@@ -77,9 +87,9 @@ def _finer(weights: Synthesis, low: Floats, latents: Ints, step: int) -> Floats:
 def _filtered(
     weights: Synthesis, linear: Floats, gain: Floats, bias: Floats, low: Floats, latents: Ints
 ) -> Floats:
-    """As `synthesis_native.finer`, in numpy."""
+    """Does the same as `synthesis_native.finer`, in numpy."""
     h, w = low.shape[:2]
-    # A place gives 2 rows of 2 samples of 3 colours.
+    # Outputs are ordered as 2 rows of 2 samples of 3 colours.
     order = np.arange(12).reshape(3, 2, 2).transpose(1, 2, 0).ravel()
     wavelets, first = by_row(linear[order]), by_row(weights.first.floats)
     third, third_bias = by_row(weights.third.floats[order]), weights.third_bias.floats[order]
@@ -96,7 +106,7 @@ def _filtered(
         np.maximum(z, 0, out=z)
         z = z.reshape(-1, w, z.shape[1])
         if top == 0:
-            z[0] = 0  # rows outside are 0, not what their bias would give
+            z[0] = 0  # rows outside count as 0, without their bias
         if bottom == h:
             z[-1] = 0
         z = convolved(z, third, 1, 1 + bottom - top)
@@ -113,7 +123,7 @@ def _soft(x: Floats) -> Floats:
 
 
 def _high_pass(x: Floats, start: int, end: int) -> Floats:
-    """Rows of x [h, w, 3] less the mean of their 3 x 3 neighbours, edges repeated."""
+    """Rows start..end - 1 of x [h, w, 3] less the mean of 3 x 3 neighbours, with edges repeated."""
     near = x.take(np.arange(start - 1, end + 1), 0, mode="clip")
     p = np.pad(near, ((0, 0), (1, 1), (0, 0)), mode="edge")
     rows = p[:, :-2] + p[:, 1:-1] + p[:, 2:]
@@ -122,9 +132,10 @@ def _high_pass(x: Floats, start: int, end: int) -> Floats:
 
 
 def _extended(low: Floats, latents: Ints, gain: Floats, top: int, bottom: int) -> Floats:
-    """Rows top - 2 .. bottom + 1 of planes [rows, w + 4, 12], mirrored as the wavelet needs it.
+    """Rows top - 2 .. bottom + 1 of all bands, mirrored beyond the edges as the wavelet needs it.
 
-    Low bands come first, then high bands.
+    Returns:
+        float32 [bottom - top + 4, w + 4, 12]: 3 low bands, then 9 high bands times their gain.
     """
     out = np.empty((bottom - top + 4, low.shape[1] + 4, 12), np.float32)
     out[..., :3] = _mirrored(low, False, False, top, bottom)
@@ -142,7 +153,11 @@ def _mirrored(
 
 
 def mirrored_indices(n: int, high: bool) -> NDArray[np.int64]:
-    """-2..n+1 mirrored: low bands about the first sample and behind the last, high reversed."""
+    """Indices -2..n + 1 of a band of n samples, mirrored into 0..n - 1; int64 [n + 4].
+
+    A low band is mirrored about its first sample and behind its last one, a high band before its
+    first sample and about its last one.
+    """
     index = np.arange(-2, n + 2)
     index = np.where(index < 0, -index - int(high), index)
     index = np.where(index >= n, 2 * n - 1 - int(high) - index, index)

@@ -1,4 +1,7 @@
-"""Synthesis of a level in the compiled kernel (`native/synthesis.h`); `synthesis` is its judge."""
+"""Synthesis of a level in the compiled kernel (`native/synthesis.h`).
+
+`synthesis` is the reference.
+"""
 
 from __future__ import annotations
 
@@ -29,15 +32,21 @@ class _Level(ct.Structure):
 def finer(
     weights: Synthesis, linear: Floats, gain: Floats, bias: Floats, low: Floats, latents: Ints
 ) -> Floats:
-    """The next finer planes [2h, 2w, 3].
+    """Computes the next finer planes of a raster.
 
     Args:
-        weights: Of the level.
-        linear: Weights of the wavelet [12, 12, 5, 5].
-        gain: Of the latents at the step [9].
-        bias: Of the first layer at the step [H].
-        low: The planes [h, w, 3].
-        latents: [9, h, w].
+        weights: Weights of the level.
+        linear: float32 [12, 12, 5, 5] weights of the linear part.
+        gain: float32 [9] gains of the latents for the quantization step.
+        bias: float32 [H] biases of the first layer for the quantization step.
+        low: float32 [h, w, 3] planes.
+        latents: int32 [9, h, w] latents of the level.
+
+    Returns:
+        float32 [2 h, 2 w, 3] planes.
+
+    Raises:
+        MemoryError: The kernel cannot allocate what it needs.
     """
     lib = kernel.library()
     assert lib is not None, "check available() first"
