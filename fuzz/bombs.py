@@ -29,7 +29,8 @@ from proxyimg_codec.container.content import Container
 from proxyimg_codec.entropy import arrays
 from proxyimg_codec.errors import PxiError
 from proxyimg_codec.geometry import deltas
-from proxyimg_codec.geometry.mesh import BORDER, NEW, RANKED, Base, Mesh, _Border
+from proxyimg_codec.geometry.connectivity import BORDER, NEW, RANKED, Border
+from proxyimg_codec.geometry.mesh import Base, Mesh
 from proxyimg_codec.texture import planes
 from proxyimg_codec.texture.pyramid import PyramidTexture
 from proxyimg_codec.validation import validate
@@ -257,7 +258,7 @@ def layers() -> bytes:
 def gates() -> bytes:
     """A mesh whose gates are open all at once, and are closed with vertices of high rank."""
     count, total = 10_500, 1 << 15
-    border = _Border(count)
+    border = Border(count)
     symbols, places = [NEW] * 3, [(100, 100), (10, 0), (0, 10)]
     corners = [border.add(100, 100), border.add(110, 100), border.add(110, 110)]
     border.place_triangle(*corners)
