@@ -32,6 +32,7 @@ from proxyimg_codec.geometry import deltas
 from proxyimg_codec.geometry.connectivity import BORDER, NEW, RANKED, Border
 from proxyimg_codec.geometry.mesh import Base, Mesh
 from proxyimg_codec.texture import planes
+from proxyimg_codec.texture.latents import Latents
 from proxyimg_codec.texture.pyramid import PyramidTexture
 from proxyimg_codec.validation import validate
 
@@ -457,7 +458,7 @@ def samples() -> bytes:
 def rasters() -> bytes:
     """Rasters of one sample each, with as many levels as there may be."""
     data = planes.encoded(
-        planes.Latents(tuple(np.zeros((9, 1 << k, 1 << k), np.int32) for k in range(7, -1, -1)),
+        Latents(tuple(np.zeros((9, 1 << k, 1 << k), np.int32) for k in range(7, -1, -1)),
                        np.zeros((3, 1, 1), np.int32)), (1, 1), 512, cell=8,
     ).packed  # fmt: skip
     count = 120

@@ -12,7 +12,8 @@ from torch import Tensor
 
 from ...texture import planes as coded
 from ...texture.network import Floats
-from ...texture.planes import Latents, Planes
+from ...texture.latents import Latents, support_at
+from ...texture.planes import Planes
 from . import refine
 from .load import load
 from .model import LEVELS, LOG_SCALES, Model
@@ -134,7 +135,7 @@ class _Job:
         cells = np.ones(coded.cells_of(r.size, CELL), bool) if r.cells is None else r.cells
         masks = []
         for level in range(1, self.count + 1):
-            at = coded.support_at(cells, CELL, r.size, level, self.count)
+            at = support_at(cells, CELL, r.size, level, self.count)
             mask = np.repeat(at[None], 9, 0)
             mask[3:] &= not r.grey
             masks.append(_tensor(mask.astype(np.float32)))
