@@ -29,8 +29,10 @@ from proxyimg_codec.container.content import Container
 from proxyimg_codec.entropy import arrays
 from proxyimg_codec.errors import PxiError
 from proxyimg_codec.geometry import deltas
-from proxyimg_codec.geometry.mesh import BORDER, NEW, RANKED, Base, Mesh, _Border
+from proxyimg_codec.geometry.connectivity import BORDER, NEW, RANKED, Border
+from proxyimg_codec.geometry.mesh import Base, Mesh
 from proxyimg_codec.texture import planes
+from proxyimg_codec.texture.latents import Latents
 from proxyimg_codec.texture.pyramid import PyramidTexture
 from proxyimg_codec.validation import validate
 
@@ -257,7 +259,7 @@ def layers() -> bytes:
 def gates() -> bytes:
     """A mesh whose gates are open all at once, and are closed with vertices of high rank."""
     count, total = 10_500, 1 << 15
-    border = _Border(count)
+    border = Border(count)
     symbols, places = [NEW] * 3, [(100, 100), (10, 0), (0, 10)]
     corners = [border.add(100, 100), border.add(110, 100), border.add(110, 110)]
     border.place_triangle(*corners)
@@ -456,7 +458,7 @@ def samples() -> bytes:
 def rasters() -> bytes:
     """Rasters of one sample each, with as many levels as there may be."""
     data = planes.encoded(
-        planes.Latents(tuple(np.zeros((9, 1 << k, 1 << k), np.int32) for k in range(7, -1, -1)),
+        Latents(tuple(np.zeros((9, 1 << k, 1 << k), np.int32) for k in range(7, -1, -1)),
                        np.zeros((3, 1, 1), np.int32)), (1, 1), 512, cell=8,
     ).packed  # fmt: skip
     count = 120

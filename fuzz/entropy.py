@@ -18,6 +18,7 @@ with run.imports(__name__):
     from proxyimg_codec.errors import FormatError
     from proxyimg_codec.geometry import deltas
     from proxyimg_codec.texture import planes
+    from proxyimg_codec.texture.latents import Latents
 
 HEAD = 9
 
@@ -113,7 +114,7 @@ def seeds() -> list[bytes]:
         head = (15, 11, 129, 60, scale, shift * 17)
         shapes = [(9, 8, 8), (9, 4, 4)]
         levels = tuple(rng.integers(-9, 9, s, np.int32) * scale // 4 for s in shapes)
-        latents = planes.Latents(levels, rng.integers(-200, 200, (3, 4, 4), np.int32))
+        latents = Latents(levels, rng.integers(-200, 200, (3, 4, 4), np.int32))
         made = planes.encoded(latents, (16, 12), 300, shifts=(shift - 8,) * 4).packed
         put(3, (*head[:4], made["lowest"][0], head[5]), made["data"], made["escapes"])
     return out

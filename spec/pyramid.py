@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from proxyimg_codec.entropy import laplace
 from proxyimg_codec.native import kernel
 from proxyimg_codec.texture import planes, registered_model
-from proxyimg_codec.texture.planes import Latents
+from proxyimg_codec.texture.latents import Decoder, Latents, support_at
 
 from .dump import grid
 
@@ -106,7 +106,7 @@ def example() -> Iterator[str]:
         yield from grid(plane)
     for channel in _HIGH:
         yield f"level 1, channel {channel}"
-        yield from grid(levels[0][channel], planes.support_at(_cells(), 1, (5, 3), 1, 1))
+        yield from grid(levels[0][channel], support_at(_cells(), 1, (5, 3), 1, 1))
     for k, name in enumerate(("red", "green", "blue")):
         yield f"{name}, in 8 bits"
         yield from grid(np.rint(shown.raster[..., k] * 255).astype(int))
@@ -117,16 +117,16 @@ def steps() -> Iterator[str]:
     yield "| Set | Mean | Scale | s' | Part | Centre | Raw bits | Symbol | Latent |"
     yield "|---|---|---|---|---|---|---|---|---|"
     sets: list[tuple[Ints, Ints, Ints]] = []
-    code = planes._Decoder.code
+    code = Decoder.code
 
-    def recorded(self: planes._Decoder, values: Ints, mean: Ints, scale: Ints) -> Ints:
+    def recorded(self: Decoder, values: Ints, mean: Ints, scale: Ints) -> Ints:
         out = code(self, values, mean, scale)
         sets.append((mean, scale, out))
         return out
 
     fields = _example().packed
     with (
-        mock.patch.object(planes._Decoder, "code", recorded),
+        mock.patch.object(Decoder, "code", recorded),
         mock.patch.object(kernel, "available", return_value=False),
     ):
         assert planes.unpack(fields).latents

@@ -33,6 +33,7 @@ from proxyimg_codec.container.file import parse
 from proxyimg_codec.entropy import arrays
 from proxyimg_codec.geometry import boundary, deltas
 from proxyimg_codec.geometry import mesh as meshes
+from proxyimg_codec.geometry.connectivity import Border
 
 from . import pyramid, registry
 from .dump import dump, values
@@ -192,7 +193,7 @@ def mesh_steps() -> Iterator[str]:
     """Rows of the table of how the gates of that mesh are decoded."""
     yield "| Gate | Near | Expected | Ranked | Symbol | Triangle |"
     yield "|---|---|---|---|---|---|"
-    border = meshes._Border(len(MESH.base.vertices))
+    border = Border(len(MESH.base.vertices))
     for x, y in MESH.base.vertices:
         border.add(int(x), int(y))
     triangles = iter(MESH.base.triangles.tolist())

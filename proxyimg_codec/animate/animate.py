@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -14,7 +14,7 @@ from ..geometry.mesh import FRACTION_BITS
 from ..model import Layer, Layers, Picture, Pictured
 from . import motion as motions
 from .bake import bake
-from .body import Body
+from .body import Body, Real
 from .coupling import ridden, touching, united
 from .motion import LayerMotion, Motion
 from .presets import Box
@@ -113,48 +113,63 @@ def animate(
         UsageError: The motion does not fit the picture.
         LimitError: Nodes are flung out of reach.
     """
-    able = _chosen(picture, None)
-    for name in motion.layers:
-        if name != "*" and name in (v.name for v in picture.layers):
-            _chosen(picture, [name])
-    size = picture.size
-    meshed_layers = {v.name: _meshed(v, size) for v in able}
-    bodies = [_body(v) for v in meshed_layers.values()]
-    riders: dict[str, list[str]] = {}
-    acting = motion
-    if motion.together:
-        riders = _riders(able, motion, size)
-        alone = [b for b in bodies if not any(b.name in group for group in riders.values())]
-        bodies = alone + [
-            united(first, [v for v in able if v.name in group], size, EDGE)
-            for first, group in riders.items()
-        ]
-        followers = {name for first, group in riders.items() for name in group if name != first}
-        kept = {k: v for k, v in motion.layers.items() if k not in followers}
-        acting = replace(motion, layers=kept)
-    found = simulate(bodies, acting, canvas=size, progress=progress)
-    moved = dict(found.displacements)
-    of_name = {b.name: b for b in bodies}
-    for first, group in riders.items():
-        if first not in moved:
-            continue
-        whole = moved[first]
-        for name in group:
-            moved[name] = ridden(of_name[first], whole, _body(meshed_layers[name]).nodes)
-    names = [v.name for v in able if v.name in moved]
+    cast = _Cast(picture, motion)
+    found = simulate(cast.bodies, cast.motion, canvas=picture.size, progress=progress)
+    moved = cast.displacements(found.displacements)
+    names = [name for name in cast.layers if name in moved]
     timeline, tracks = bake(
         [moved[n] for n in names], fps=found.fps, loop=found.loop, script=motion.to_json()
     )
-    first_of = {name: first for first, group in riders.items() for name in group}
-    body = {name: names.index(first_of.get(name, name)) for name in names}
-    track = {n: replace(t, body=body[n]) for n, t in zip(names, tracks, strict=True)}
+    moving = {
+        name: replace(cast.layers[name], track=replace(track, body=names.index(cast.first(name))))
+        for name, track in zip(names, tracks, strict=True)
+    }
     layers = [
-        replace(meshed_layers[v.name], track=track[v.name])
-        if v.name in track
-        else replace(v, track=None)
-        for v in picture.layers
+        moving[v.name] if v.name in moving else replace(v, track=None) for v in picture.layers
     ]
     return replace(picture, layers=Layers(layers), timeline=timeline)
+
+
+class _Cast:
+    """What takes part in a motion.
+
+    Attributes:
+        layers: All layers that can move, by name, with meshes.
+        bodies: What is simulated: such layers, and wholes of layers that move as one.
+        motion: What the bodies do; wholes have the names of their first layers.
+    """
+
+    def __init__(self, picture: Picture, motion: Motion) -> None:
+        """Raises `UsageError` if the motion does not fit the picture."""
+        able, size = _chosen(picture, None), picture.size
+        for name in motion.layers:
+            if name != "*" and name in (v.name for v in picture.layers):
+                _chosen(picture, [name])
+        self.layers = {v.name: _meshed(v, size) for v in able}
+        self._wholes = _wholes(able, motion, size) if motion.together else {}
+        self._first_of = {name: first for first, group in self._wholes.items() for name in group}
+        alone = [_body(v) for name, v in self.layers.items() if name not in self._first_of]
+        self.bodies = alone + [
+            united(first, [v for v in able if v.name in group], size, EDGE)
+            for first, group in self._wholes.items()
+        ]
+        kept = {k: v for k, v in motion.layers.items() if self.first(k) == k}
+        self.motion = replace(motion, layers=kept)
+
+    def first(self, name: str) -> str:
+        """The first layer of the whole that a layer is part of; itself if it moves alone."""
+        return self._first_of.get(name, name)
+
+    def displacements(self, found: Mapping[str, Real]) -> dict[str, Real]:
+        """Displacements [F, N, 2] of each layer that moves, from those of the bodies by name."""
+        moved = dict(found)
+        bodies = {b.name: b for b in self.bodies}
+        for first, group in self._wholes.items():
+            if first in found:
+                for name in group:
+                    nodes = _body(self.layers[name]).nodes
+                    moved[name] = ridden(bodies[first], found[first], nodes)
+        return moved
 
 
 def _meshed(layer: Layer, size: tuple[int, int]) -> Layer:
@@ -169,7 +184,7 @@ def _body(layer: Layer) -> Body:
     return Body(layer.name, refined.nodes / (1 << FRACTION_BITS), refined.faces)
 
 
-def _riders(layers: Sequence[Layer], motion: Motion, size: tuple[int, int]) -> dict[str, list[str]]:
+def _wholes(layers: Sequence[Layer], motion: Motion, size: tuple[int, int]) -> dict[str, list[str]]:
     """Layers that move as one, at least two, by the name of their first."""
     rest = motion.layers.get("*")
     found: dict[str, list[str]] = {}

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..animate.presets import PRESETS
 from ..errors import UsageError
-from .common import EXIT_CODES, Bar, add_limits, check_target, limits_of, parser, run
-from .decode import key
+from .common import EXIT_CODES, Bar, add_limits, check_target, key, limits_of, parser, run
 
 if TYPE_CHECKING:
     from ..animate.motion import Motion
@@ -186,7 +185,7 @@ def write_picture(image: Image, args: argparse.Namespace) -> str:
     data = image.to_bytes()
     write_atomically(args.output, data)
     extra = len(data) - len(to_bytes(replace(image.picture, timeline=None)))
-    assert image.timeline is not None
+    assert image.timeline is not None, "it was given a motion"
     return (
         f"{len(data)} bytes, {extra} of them motion of {image.timeline.seconds:g} s, nodes "
         f"displaced by {amplitude(image):.1f} px in the mean"
@@ -198,7 +197,7 @@ def write_clip(image: Image, args: argparse.Namespace) -> str:
     from ..animate.sequence import frames, times
     from ..export import clip
 
-    assert image.timeline is not None
+    assert image.timeline is not None, "it moves, or was given a motion"
     playing = not (args.preset or args.motion)
     at = times(image, duration=args.duration if playing else None, fps=args.fps)
     width, height = size_of(args.size, image)

@@ -87,6 +87,12 @@ def run(prog: str, work: Callable[[], None]) -> int:
     return code
 
 
+def key(name: str) -> str | int:
+    """A layer's address: digits are an index, everything else a name."""
+    digits = name.removeprefix("-")
+    return int(name) if digits.isdecimal() and len(digits) < 10 else name
+
+
 def printable(text: str) -> str:
     """Text of a file for a terminal: nothing in it controls that."""
     return text if text.isprintable() else ascii(text)

@@ -18,6 +18,7 @@ from .common import (
     add_limits,
     check_target,
     default_target,
+    key,
     limits_of,
     parser,
     run,
@@ -194,12 +195,6 @@ def texture_model(image: Any, args: argparse.Namespace) -> Any:
 def selected(image: Any, names: list[str] | None) -> list[Any]:
     """The layers of --layer, all by default."""
     return [image.layers[key(n)] for n in names] if names else list(image.layers)
-
-
-def key(name: str) -> str | int:
-    """A layer's address: digits are an index, everything else a name."""
-    digits = name.removeprefix("-")
-    return int(name) if digits.isdecimal() and len(digits) < 10 else name
 
 
 def render(image: Any, output: str, args: argparse.Namespace) -> None:

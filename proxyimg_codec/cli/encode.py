@@ -25,6 +25,20 @@ def arguments() -> argparse.ArgumentParser:
                    "those of OUT, or - for standard input")  # fmt: skip
     p.add_argument("output", metavar="OUT", nargs="?", help=".pxi file, - for standard output; "
                    "IN with the suffix .pxi by default")  # fmt: skip
+    _add_aims(p)
+    _add_decomposition(p)
+    _add_details(p)
+    p.add_argument("--strip", action="store_true", help="leave out ICC, EXIF and XMP")
+    p.add_argument("-f", "--force", action="store_true", help="replace OUT if it exists")
+    p.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    p.add_argument(
+        "--json", action="store_true", help="print the report as JSON on standard output"
+    )
+    return p
+
+
+def _add_aims(p: argparse.ArgumentParser) -> None:
+    """What the file should be like, and how much time that may take."""
     add = p.add_argument
     add("-q", "--quality", type=float, metavar="0-100", help="default 50")
     add("--target-bpp", type=float, metavar="B", help="bits a pixel of the whole file, hit within "
@@ -41,6 +55,11 @@ def arguments() -> argparse.ArgumentParser:
     add("--preset", choices=PRESET_NAMES, default="default",
         help="effort 2, 5 or 8; paper: the literal method of ProxyImg, 4-bit codes and network, "
         "Chamfer boundaries. Other flags go before it")  # fmt: skip
+
+
+def _add_decomposition(p: argparse.ArgumentParser) -> None:
+    """What the layers are."""
+    add = p.add_argument
     add("--masks", metavar="PATH", help="folder of mask PNGs, or one label PNG: the layers to make")
     add("--max-layers", type=int, metavar="N", help="most layers found; default 4")
     add("--layers", type=int, choices=[1], help="1: one layer, no decomposition")
@@ -54,23 +73,18 @@ def arguments() -> argparse.ArgumentParser:
     add("--mesh", metavar="NAME", help="who makes proxy nodes: delaunay (default with texture "
         "implicit), triwild, ftetwild, or none (default with pyramid: edits make "
         "them)")  # fmt: skip
+
+
+def _add_details(p: argparse.ArgumentParser) -> None:
+    """How codes are stored, and where the work is done."""
+    add = p.add_argument
     add("--feature-bits", type=int, metavar="2-8", help="bits a code; from quality by default")
     add("--net-bits", type=int, metavar="2-8", help="bits a network weight; default 8; "
         "like --feature-bits for texture implicit")  # fmt: skip
     add("--seed", type=int, default=0, help="seed of everything random; default 0")
-    add(
-        "-j",
-        "--jobs",
-        type=int,
-        metavar="N",
-        help="threads, at most 4 of use; all cores by default",
-    )
+    add("-j", "--jobs", type=int, metavar="N", help="threads, at most 4 of use; all cores by "
+        "default")  # fmt: skip
     add("--device", choices=["cpu", "cuda"], default="cpu", help="where to fit; default cpu")
-    add("--strip", action="store_true", help="leave out ICC, EXIF and XMP")
-    add("-f", "--force", action="store_true", help="replace OUT if it exists")
-    add("--quiet", action="store_true", help="print nothing but errors")
-    add("--json", action="store_true", help="print the report as JSON on standard output")
-    return p
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -48,45 +48,6 @@ def show(args: argparse.Namespace) -> None:
 def describe(c: Container, size: int) -> dict[str, Any]:
     """Facts about a file of `size` bytes, ready for JSON."""
     width, height = c.head["size"]
-    areas = (c.info or {}).get("areas") or [None] * len(c.layers)
-    meshes = {m["layer"]: m for m in c.meshes}
-    poses = {p["layer"]: p for p in c.poses}
-    moving = c.motion["layers"] if c.motion else []
-    layers = []
-    for i, (layer, area) in enumerate(zip(c.layers, areas, strict=True)):
-        texture = c.texture_of(i)
-        layers.append(
-            {
-                "name": layer["name"],
-                "box": list(layer["box"]),
-                "area": area,
-                "segments": sum(layer["segments"]),
-                "coder": CODERS[texture["coder"]],
-                **{k: texture.get(k) for k in VIEWED},
-                "alpha": texture["alpha"] - 1 if texture.get("alpha") else None,
-                "sampling": SAMPLINGS[layer["sampling"]],
-                "shares": c.textures[i].get("texture"),
-                "vertices": meshes[i]["vertices"] if i in meshes else None,
-                "pose": _pose(poses[i]) if i in poses else None,
-                "boundary_bytes": len(layer["classes"]) + len(layer["deltas"]),
-                "moves": i in moving,
-                "mesh_bytes": _bytes(meshes.get(i)),
-                "pose_bytes": _bytes(poses.get(i)),
-                "texture_bytes": 0
-                if texture is not c.textures[i]
-                else sum(len(texture.get(k, b"")) for k in ("codes", "stored", "mask")),
-            }
-        )
-    networks = [
-        {k: n[k] for k in ("dim", "octaves", "hidden", "depth", "channels", "bits")}
-        | {"bytes": len(n["weights"]) + len(n["steps"]) + len(n["biases"])}
-        for n in c.networks
-    ]
-    planes = [
-        {k: p[k] for k in ("model", "size", "components", "levels")}
-        | {"q": round(2 ** (p["step"] / 64), 3), "bytes": _bytes(p)}
-        for p in c.planes
-    ]
     return {
         "version": f"{VERSION[0]}.{VERSION[1]}",
         "bytes": size,
@@ -95,9 +56,9 @@ def describe(c: Container, size: int) -> dict[str, Any]:
         "height": height,
         "alpha": not c.head["opaque"],
         "depth": c.head["depth"],
-        "layers": layers,
-        "networks": networks,
-        "planes": planes,
+        "layers": _layers(c),
+        "networks": [_network(n) for n in c.networks],
+        "planes": [_planes(p) for p in c.planes],
         "motion": _motion(c),
         "groups": c.tree["groups"] if c.tree else [],
         "edits": [step.operation for step in c.history],
@@ -106,6 +67,63 @@ def describe(c: Container, size: int) -> dict[str, Any]:
         "encoder": (c.info or {}).get("encoder"),
         "settings": settings(c),
     }
+
+
+def _layers(c: Container) -> list[dict[str, Any]]:
+    """Facts about each layer."""
+    areas = (c.info or {}).get("areas") or [None] * len(c.layers)
+    meshes = {m["layer"]: m for m in c.meshes}
+    poses = {p["layer"]: p for p in c.poses}
+    moving = c.motion["layers"] if c.motion else []
+    return [
+        {
+            "name": layer["name"],
+            "box": list(layer["box"]),
+            "area": area,
+            "segments": sum(layer["segments"]),
+            **_texture(c, i),
+            "vertices": meshes[i]["vertices"] if i in meshes else None,
+            "pose": _pose(poses[i]) if i in poses else None,
+            "boundary_bytes": len(layer["classes"]) + len(layer["deltas"]),
+            "moves": i in moving,
+            "mesh_bytes": _bytes(meshes.get(i)),
+            "pose_bytes": _bytes(poses.get(i)),
+            "texture_bytes": _texture_bytes(c, i),
+        }
+        for i, (layer, area) in enumerate(zip(c.layers, areas, strict=True))
+    ]
+
+
+def _texture(c: Container, i: int) -> dict[str, Any]:
+    """Facts about the texture of layer `i`."""
+    texture = c.texture_of(i)
+    return {
+        "coder": CODERS[texture["coder"]],
+        **{k: texture.get(k) for k in VIEWED},
+        "alpha": texture["alpha"] - 1 if texture.get("alpha") else None,
+        "sampling": SAMPLINGS[c.layers[i]["sampling"]],
+        "shares": c.textures[i].get("texture"),
+    }
+
+
+def _texture_bytes(c: Container, i: int) -> int:
+    """Bytes of the coded parts of the texture of layer `i`; 0 if it is that of another layer."""
+    texture = c.texture_of(i)
+    if texture is not c.textures[i]:
+        return 0
+    return sum(len(texture.get(k, b"")) for k in ("codes", "stored", "mask"))
+
+
+def _network(n: Mapping[str, Any]) -> dict[str, Any]:
+    """Facts about a network."""
+    told = {k: n[k] for k in ("dim", "octaves", "hidden", "depth", "channels", "bits")}
+    return {**told, "bytes": len(n["weights"]) + len(n["steps"]) + len(n["biases"])}
+
+
+def _planes(p: Mapping[str, Any]) -> dict[str, Any]:
+    """Facts about planes."""
+    told = {k: p[k] for k in ("model", "size", "components", "levels")}
+    return {**told, "q": round(2 ** (p["step"] / 64), 3), "bytes": _bytes(p)}
 
 
 def _bytes(fields: Mapping[str, Any] | None) -> int:
@@ -158,43 +176,16 @@ def settings(c: Container) -> Any:
 def text(f: dict[str, Any]) -> str:
     """The facts for people."""
     alpha = "with transparency" if f["alpha"] else "opaque"
+    chunks = ", ".join(f"{name} {size}" for name, size in f["chunk_bytes"].items())
     lines = [
         f"pxi {f['version']}, {f['width']}x{f['height']}, {alpha}, {f['depth']}-bit original",
-        f"{f['bytes']} bytes, {f['bpp']:.3f} bpp: "
-        + ", ".join(f"{name} {size}" for name, size in f["chunk_bytes"].items()),
+        f"{f['bytes']} bytes, {f['bpp']:.3f} bpp: {chunks}",
     ]
-    for i, v in enumerate(f["layers"]):
-        x, y, w, h = v["box"]
-        area = "" if v["area"] is None else f", {v['area']} px visible"
-        outline = f"{v['segments']} segments" if v["segments"] else "whole canvas"
-        mesh = "" if v["vertices"] is None else f", {v['vertices']} vertices"
-        sampling = "" if v["sampling"] == "direct" else f" ({v['sampling']})"
-        shares = "" if v["shares"] is None else f" shared with layer {v['shares']}"
-        pose = "" if v["pose"] is None else f", {' and '.join(v['pose'])}"
-        sizes = [v[f"{part}_bytes"] for part in ("boundary", "mesh", "pose", "texture")]
-        lines.append(
-            f"layer {i} {v['name']!r}: {w}x{h} at {x},{y}{area}, {outline}{mesh}{pose}, "
-            f"{v['coder']}{sampling} {_texture(v)}"
-            f"{shares}, {' + '.join(str(n) for n in sizes if n) or 0} bytes"
-        )
-    for i, n in enumerate(f["networks"]):
-        lines.append(
-            f"network {i}: {n['dim']} features, {n['octaves']} octaves, {n['depth']} hidden layers "
-            f"of {n['hidden']}, {n['channels']} outputs, {n['bits']} bits, {n['bytes']} bytes"
-        )
-    for i, p in enumerate(f["planes"]):
-        lines.append(
-            f"planes {i}: {p['size'][0]}x{p['size'][1]} {'grey' if p['components'] == 1 else 'RGB'}"
-            f" samples, {p['levels']} levels, step {p['q']:g}, model {p['model']}, "
-            f"{p['bytes']} bytes"
-        )
-    if m := f["motion"]:
-        loop = ", in a loop" if m["loop"] else ""
-        lines.append(
-            f"motion: {', '.join(map(repr, m['layers']))} for {m['seconds']:g} s{loop}, made for "
-            f"{m['fps']} frames a second, {m['modes']} shapes, {m['intervals']} intervals, "
-            f"{m['bytes']} bytes"
-        )
+    lines += [f"layer {i} {_layer_text(v)}" for i, v in enumerate(f["layers"])]
+    lines += [f"network {i}: {_network_text(n)}" for i, n in enumerate(f["networks"])]
+    lines += [f"planes {i}: {_planes_text(p)}" for i, p in enumerate(f["planes"])]
+    if f["motion"]:
+        lines.append(f"motion: {_motion_text(f['motion'])}")
     if f["groups"]:
         lines.append(f"groups: {', '.join(map(repr, f['groups']))}")
     lines += [f"edit {i}: {printable(v)}" for i, v in enumerate(f["edits"], 1)]
@@ -204,8 +195,23 @@ def text(f: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _texture(layer: dict[str, Any]) -> str:
-    """What the texture of a layer is."""
+def _layer_text(v: dict[str, Any]) -> str:
+    x, y, w, h = v["box"]
+    area = "" if v["area"] is None else f", {v['area']} px visible"
+    outline = f"{v['segments']} segments" if v["segments"] else "whole canvas"
+    mesh = "" if v["vertices"] is None else f", {v['vertices']} vertices"
+    sampling = "" if v["sampling"] == "direct" else f" ({v['sampling']})"
+    shares = "" if v["shares"] is None else f" shared with layer {v['shares']}"
+    pose = "" if v["pose"] is None else f", {' and '.join(v['pose'])}"
+    sizes = [v[f"{part}_bytes"] for part in ("boundary", "mesh", "pose", "texture")]
+    return (
+        f"{v['name']!r}: {w}x{h} at {x},{y}{area}, {outline}{mesh}{pose}, "
+        f"{v['coder']}{sampling} {_texture_text(v)}"
+        f"{shares}, {' + '.join(str(n) for n in sizes if n) or 0} bytes"
+    )
+
+
+def _texture_text(layer: dict[str, Any]) -> str:
     if layer["part"] is None:
         return f"{layer['grid'][0]}x{layer['grid'][1]} codes of {layer['bits']} bits"
     x, y, width, height = layer["part"]
@@ -213,6 +219,31 @@ def _texture(layer: dict[str, Any]) -> str:
     outlines = ", ".join(str(n) for n in layer["cuts"])
     cuts = f" cut by layer{'s' * (len(layer['cuts']) > 1)} {outlines}" if outlines else ""
     return f"{width}x{height} samples at {x},{y} of planes {layer['planes']}{alpha}{cuts}"
+
+
+def _network_text(n: dict[str, Any]) -> str:
+    return (
+        f"{n['dim']} features, {n['octaves']} octaves, {n['depth']} hidden layers "
+        f"of {n['hidden']}, {n['channels']} outputs, {n['bits']} bits, {n['bytes']} bytes"
+    )
+
+
+def _planes_text(p: dict[str, Any]) -> str:
+    columns, rows = p["size"]
+    colours = "grey" if p["components"] == 1 else "RGB"
+    return (
+        f"{columns}x{rows} {colours} samples, {p['levels']} levels, step {p['q']:g}, "
+        f"model {p['model']}, {p['bytes']} bytes"
+    )
+
+
+def _motion_text(m: dict[str, Any]) -> str:
+    loop = ", in a loop" if m["loop"] else ""
+    return (
+        f"{', '.join(map(repr, m['layers']))} for {m['seconds']:g} s{loop}, made for "
+        f"{m['fps']} frames a second, {m['modes']} shapes, {m['intervals']} intervals, "
+        f"{m['bytes']} bytes"
+    )
 
 
 if __name__ == "__main__":

@@ -165,7 +165,7 @@ def _brought(picture: Picture, home: Picture, origin: Layer, networks: list[Netw
         )
         return replace(texture, planes=own, alpha=alpha[0] if alpha else None)
     brought = home.network_of(origin)
-    assert brought is not None
+    assert brought is not None, "an implicit texture has a network"
     same = (i for i, v in enumerate(networks) if v.packed == brought.packed)
     number = next(same, len(networks))
     if number == len(networks):
@@ -216,13 +216,13 @@ def _placed(layer: Layer, origin: Layer, matched: Shapes | None) -> Layer:
 
     `matched` says whose outlines meet; None stretches box to box.
     """
-    assert layer.mesh is not None
+    assert layer.mesh is not None, "`meshed` gave it one"
     rest = layer.mesh.refined.nodes / (1 << FRACTION_BITS)
     here, there = (np.array(v.box, float).reshape(2, 2) for v in (layer, origin))
     scale = here[1] / there[1]
     points = there[0] + (rest - here[0]) / scale if matched is None else _matched(rest, matched)
     if origin.pose.places is not None:
-        assert origin.mesh is not None
+        assert origin.mesh is not None, "places need a mesh"
         refined = origin.mesh.refined
         fixed = np.rint(points * (1 << FRACTION_BITS)).astype(np.int64)
         face, weights = barycentric(fixed, refined.nodes, refined.faces)

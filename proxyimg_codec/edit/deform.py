@@ -70,27 +70,35 @@ def drag(
     mesh = _checked(nodes, triangles, points, targets, rest)
     if not len(points):
         return np.array(nodes, np.float64)
-    z, z0, p, t = map(_complex, (nodes, rest, points, targets))
-    holders, weights = _attach(z, mesh, p)
+    return _columns(_dragged(mesh, *map(_complex, (nodes, rest, points, targets))))
+
+
+def _dragged(mesh: Index, z: Complex, rest: Complex, points: Complex, targets: Complex) -> Complex:
+    """As `drag`, of complex numbers, one component after the other."""
+    holders, weights = _attach(z, mesh, points)
     held = (weights * z[mesh[holders]]).sum(1)
-    t = t - (p - held)
+    t = targets - (points - held)
     component = _components(len(z), mesh)
+    grabbed = component[mesh[holders, 0]]  # by each handle
     moved = z.copy()
-    grabbed = np.unique(component[mesh[holders, 0]])
-    for c in grabbed:
-        mine = component[mesh[holders, 0]] == c
+    for c in np.unique(grabbed):
+        mine = grabbed == c
         if mine.sum() == 1:
             moved[component == c] += (t - held)[mine]
             continue
         inside = np.flatnonzero(component == c)
-        which = component[mesh[:, 0]] == c
-        local = np.searchsorted(inside, mesh[which])
-        own = np.cumsum(which)[holders[mine]] - 1
-        body = _Body(z0[inside], local, own, weights[mine])
+        body = _body_of(inside, rest, mesh, holders[mine], weights[mine])
         start = _rigid(held[mine], t[mine], z[inside])
         moved[inside] = _settle(body, start, t[mine])
     _follow(z, moved, component, grabbed)
-    return _columns(moved)
+    return moved
+
+
+def _body_of(inside: Index, rest: Complex, mesh: Index, holders: Index, weights: Real) -> _Body:
+    """The component of the nodes `inside`, ascending, with the handles that hold it."""
+    which = np.isin(mesh[:, 0], inside)
+    local = np.searchsorted(inside, mesh[which])
+    return _Body(rest[inside], local, np.cumsum(which)[holders] - 1, weights)
 
 
 def _checked(

@@ -7,8 +7,6 @@ and returns another; the original is never changed.
 from __future__ import annotations
 
 import json
-import math
-import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -19,6 +17,7 @@ from ..codec.write import state
 from ..container.undo import Step
 from ..errors import UsageError
 from ..geometry.pose import OPACITY_MAX
+from ..io import json_schema
 from ..model import Layer, Layers, Picture
 from ..render.neighbours import settled
 from ..texture.network import Network
@@ -115,7 +114,7 @@ def run(picture: Picture, values: Mapping[str, Any]) -> Picture:
             known = ", ".join(chosen.parameters)
             raise UsageError(f"{name}: parameter {key!r} is unknown; there are {known}")
     for key, parameter in chosen.parameters.items():
-        if key in given and not _fits(given[key], KINDS[parameter.kind]):
+        if key in given and not _fits(given[key], parameter.kind):
             value = repr(given[key])
             shown = value if len(value) <= 80 else f"{value[:77]}..."
             raise UsageError(f"{name}: {key} is {shown}; it must be {parameter.meaning}")
@@ -135,22 +134,13 @@ def _plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, (np.generic, np.ndarray)) else value
 
 
-def _fits(value: Any, schema: Mapping[str, Any]) -> bool:
-    """Whether a value satisfies the part of JSON schema that `KINDS` uses."""
-    if "enum" in schema:
-        return value in schema["enum"]
-    types = [schema["type"]] if isinstance(schema["type"], str) else schema["type"]
-    if isinstance(value, bool):
+def _fits(value: Any, kind: str) -> bool:
+    """Whether a value is of a kind. Numbers that count are not floating point."""
+    try:
+        json_schema.check(value, KINDS[kind], whole_floats=False)
+    except UsageError:
         return False
-    if isinstance(value, str):
-        return "string" in types and re.search(schema.get("pattern", ""), value) is not None
-    if isinstance(value, (int, float)):
-        within = -schema.get("maximum", math.inf) <= value <= schema.get("maximum", math.inf)
-        return within and ("number" in types or ("integer" in types and isinstance(value, int)))
-    if isinstance(value, list) and "array" in types:
-        low, high = schema.get("minItems", 0), schema.get("maxItems", math.inf)
-        return low <= len(value) <= high and all(_fits(v, schema["items"]) for v in value)
-    return False
+    return True
 
 
 def layer_named(picture: Picture, name: str | int) -> Layer:

@@ -65,11 +65,8 @@ def load(
         curves = curves_of(element, size, where)
         with np.errstate(all="ignore"):  # what overflows is refused below
             curves = [c @ matrix[:2, :2].T + matrix[:2, 2] for c in curves]
-        if len(curves) > 1 and _fill_rule(element) == "evenodd":
-            raise UnsupportedError(
-                f"{where}: fill-rule evenodd is not supported; set it to nonzero and make its "
-                "holes run the other way (in Inkscape: Path > Union)"
-            )
+        if len(curves) > 1:
+            _check_fill_rule(element, where)
         found[layer.name] = _boundary(curves, layer, picture, where)
         segments = sum(sum(b.segments) for b in found.values() if b is not None)
         limits.check("segments", segments)
@@ -78,9 +75,14 @@ def load(
     return {layer: boundary for layer, boundary in found.items() if boundary is not None}
 
 
-def _fill_rule(element: Element) -> str:
+def _check_fill_rule(element: Element, where: str) -> None:
     styled = re.search(r"fill-rule\s*:\s*(\w+)", element.get("style", ""))
-    return styled[1] if styled else element.get("fill-rule", "nonzero")
+    rule = styled[1] if styled else element.get("fill-rule", "nonzero")
+    if rule == "evenodd":
+        raise UnsupportedError(
+            f"{where}: fill-rule evenodd is not supported; set it to nonzero and make its "
+            "holes run the other way (in Inkscape: Path > Union)"
+        )
 
 
 def _layer_of(element: Element, picture: Picture, name: str) -> Layer:

@@ -163,7 +163,7 @@ def meshed(picture: Picture, layer: Layer) -> Layer:
 def drag(picture: Picture, layer: str | int, handles: Sequence[Sequence[float]]) -> Picture:
     """Bends a layer so that points of it move; a point with 0, 0 stays."""
     chosen = meshed(picture, layer_named(picture, layer))
-    assert chosen.mesh is not None
+    assert chosen.mesh is not None, "`meshed` gives it one"
     refined, pose = chosen.mesh.refined, chosen.pose
     values = np.array(handles, float)
     present = pose.present(refined) / _SCALE
@@ -174,7 +174,7 @@ def drag(picture: Picture, layer: str | int, handles: Sequence[Sequence[float]])
 
 def _bent(layer: Layer, present: NDArray[np.float64]) -> Pose:
     """The pose that brings the nodes of a layer to present positions [N, 2] in pixels."""
-    assert layer.mesh is not None
+    assert layer.mesh is not None, "what bends has a mesh"
     pose = layer.pose
     a, b, c, d, e, f = inverse(pose.floats)
     x, y = present.T

@@ -1,4 +1,4 @@
-"""From a picture to an `Picture`: layers, boundaries, fitted and quantized textures."""
+"""From pixels to a `Picture`: layers, boundaries, fitted and quantized textures."""
 
 from __future__ import annotations
 
@@ -67,24 +67,12 @@ def encode(
         UsageError: A setting is out of range.
         UnsupportedError: Something needed is not installed.
     """
-    settings = settings or Settings()
-    if options:
-        try:
-            settings = replace(settings, **options)
-        except TypeError as error:
-            raise UsageError(f"encode: {error}") from None
-    pixels = np.asarray(pixels)
+    settings = _with_options(settings or Settings(), options)
     report = progress or (lambda stage, done, total: None)
-    picture, depth = to_float(pixels)
+    picture, depth = to_float(np.asarray(pixels))
     DEFAULT_LIMITS.check("side", max(picture.shape[:2]))
     check_blocks(blocks or {})
-    report("layers", 0, 1)
-    plan = plan_layers(picture, settings, masks)
-    report("layers", 1, 1)
-    if settings.background == "complete" and not plan.opaque:
-        raise UsageError("background complete needs an opaque picture")
-
-    height, width = picture.shape[:2]
+    plan = _planned(picture, settings, masks, report)
     premultiplied = picture.copy()
     premultiplied[..., :3] *= picture[..., 3:]
     plan = with_meshes(premultiplied, plan, settings)
@@ -92,17 +80,43 @@ def encode(
         from .pyramid.picture import encode_picture
 
         image = encode_picture(picture, plan, settings, report)
-        return replace(image, depth=depth, blocks=dict(blocks or {}))
+    else:
+        image = _with_network(premultiplied, plan, settings, report)
+    return replace(image, depth=depth, blocks=dict(blocks or {}))
+
+
+def _with_options(settings: Settings, options: Mapping[str, Any]) -> Settings:
+    """Settings with some fields changed."""
+    try:
+        return replace(settings, **options) if options else settings
+    except TypeError as error:
+        raise UsageError(f"encode: {error}") from None
+
+
+def _planned(
+    picture: Floats, settings: Settings, masks: Sequence[Region] | None, report: Progress
+) -> Plan:
+    """The layers of a picture [H, W, 4] with straight alpha."""
+    report("layers", 0, 1)
+    plan = plan_layers(picture, settings, masks)
+    report("layers", 1, 1)
+    if settings.background == "complete" and not plan.opaque:
+        raise UsageError("background complete needs an opaque picture")
+    return plan
+
+
+def _with_network(picture: Floats, plan: Plan, settings: Settings, report: Progress) -> Picture:
+    """The planned layers of a premultiplied picture [H, W, 4], with codes and a network."""
+    height, width = picture.shape[:2]
     outlines = [layer.boundary for layer in plan.layers]
 
     def problem_of(shape: NetShape, spacing: float) -> Problem:
-        problem = build(premultiplied, outlines, shape, spacing)
+        problem = build(picture, outlines, shape, spacing)
         if outlines[0] is None and settings.sampling == "direct":
             problem = extended(problem, width, height, spacing)
         return problem
 
-    image = fit_image(problem_of, height * width, plan, (width, height), settings, report)
-    return replace(image, depth=depth, blocks=dict(blocks or {}))
+    return fit_image(problem_of, height * width, plan, (width, height), settings, report)
 
 
 def plain(picture: Floats) -> bool:
@@ -116,7 +130,7 @@ def fit_image(
     plan: Plan,
     size: tuple[int, int],
     settings: Settings,
-    report: Callable[[str, int, int], None],
+    report: Progress,
 ) -> Picture:
     """The 8-bit picture, without metadata, of planned layers.
 
@@ -126,7 +140,7 @@ def fit_image(
         plan: The layers.
         size: Width and height of the canvas.
         settings: What is asked for.
-        report: As `Progress`.
+        report: Told what is done.
     """
     shape, spacing = settings.network(pixels, plan.channels), settings.spacing
     problem = problem_of(shape, spacing)
@@ -161,7 +175,7 @@ def check_blocks(blocks: Mapping[str, bytes]) -> None:
 
 
 def _fit(
-    problem: Problem, settings: Settings, report: Callable[[str, int, int], None]
+    problem: Problem, settings: Settings, report: Progress
 ) -> tuple[State, list[NDArray[np.bool_]]]:
     """Fitted state, and the mask of stored codes of each layer."""
     if (problem.target == problem.target[0]).all():

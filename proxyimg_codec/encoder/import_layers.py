@@ -1,4 +1,4 @@
-"""From a layered picture to an `Picture`: every layer becomes one of its own.
+"""From a layered picture to a `Picture`: every layer becomes one of its own.
 
 Other than from a flat picture, a layer's texture is learnt from all of its own pixels, also those
 that others hide.
@@ -7,7 +7,7 @@ that others hide.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import cv2
@@ -58,20 +58,8 @@ def encode_layers(
     report = progress or (lambda stage, done, total: None)
     DEFAULT_LIMITS.check("side", max(picture.width, picture.height))
     check_blocks(picture.blocks)
-    sources: list[SourceLayer] = []
-    plans: list[Plan] = []
-    left_out = list(picture.left_out)
-    for k, source in enumerate(picture.layers):
-        report("layers", k, len(picture.layers))
-        plan = _plan(source, picture, settings)
-        if plan.layers[0].boundary is None and not plan.opaque:
-            left_out.append(source.name)
-        else:
-            sources.append(source)
-            plans.append(plan)
-    if not sources:
-        raise InputError("all layers are empty, or too faint to be seen")
-    picture = replace(picture, layers=tuple(sources), left_out=tuple(left_out))
+    picture, plans = _planned(picture, settings, report)
+    sources = picture.layers
     visible = composite(picture)
     visible[..., :3] *= visible[..., 3:]
     whole = Plan(tuple(p.layers[0] for p in plans), 4, False)
@@ -88,11 +76,31 @@ def encode_layers(
     return _merged(parts, picture, covered), picture
 
 
+def _planned(
+    picture: LayeredPicture, settings: Settings, report: Progress
+) -> tuple[LayeredPicture, list[Plan]]:
+    """The source with the layers that can be found, and the plan of each."""
+    sources: list[SourceLayer] = []
+    plans: list[Plan] = []
+    left_out = list(picture.left_out)
+    for k, source in enumerate(picture.layers):
+        report("layers", k, len(picture.layers))
+        plan = _plan(source, picture, settings)
+        if plan.layers[0].boundary is None and not plan.opaque:
+            left_out.append(source.name)
+        else:
+            sources.append(source)
+            plans.append(plan)
+    if not sources:
+        raise InputError("all layers are empty, or too faint to be seen")
+    return replace(picture, layers=tuple(sources), left_out=tuple(left_out)), plans
+
+
 def _fitted(
     picture: LayeredPicture,
     plan: Plan,
     settings: Settings,
-    report: Callable[[str, int, int], None],
+    report: Progress,
 ) -> Picture:
     """The layers of `picture` as those of an image with one network."""
     size = (picture.width, picture.height)

@@ -13,7 +13,7 @@ import math
 import os
 import shutil
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from fractions import Fraction
 from pathlib import Path
 from typing import Protocol
@@ -22,9 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, UsageError
-from .clip_movies import MOVIES, import_av, movie_of, write_errors
+from .clip_movies import MOVIES, movie_of
 from .clip_pictures import Numbered, Sheet
 from .clip_target import KINDS, SLOWEST, Target, target_of
+from .ffmpeg import import_av, write_errors
 
 __all__ = ["Target", "target_of", "write_clip"]
 
@@ -83,18 +84,23 @@ def write_clip(
         import_av()
     with _staged(target, path) as stage:
         ready = _ready(frames, size, alpha and target.alpha_bits > 0, background)
-        first = next(ready, None)
-        if first is None:
-            raise UsageError(f"{path}: there are no frames to write")
-        with _explained(path):
-            coder = _coder_of(target, stage, first, rate, loop, quality)
-        with contextlib.closing(coder):
-            for frame in itertools.chain([first], ready):
-                with _explained(path):
-                    coder.add(frame)
-            with _explained(path):
-                coder.finish()
+        _code(ready, lambda first: _coder_of(target, stage, first, rate, loop, quality), path)
         return sum(file.stat().st_size for file in stage.iterdir())
+
+
+def _code(frames: Iterator[Frame], coder_of: Callable[[Frame], _Coder], path: str) -> None:
+    """Writes frames with a coder that is made for the first of them."""
+    first = next(frames, None)
+    if first is None:
+        raise UsageError(f"{path}: there are no frames to write")
+    with _explained(path):
+        coder = coder_of(first)
+    with contextlib.closing(coder):
+        for frame in itertools.chain([first], frames):
+            with _explained(path):
+                coder.add(frame)
+        with _explained(path):
+            coder.finish()
 
 
 class _Coder(Protocol):

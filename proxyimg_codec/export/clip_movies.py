@@ -5,48 +5,22 @@ from __future__ import annotations
 import contextlib
 import io
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..errors import UnsupportedError
+from .ffmpeg import Frame, graph, import_av, layout_of, pulled, video_frame, write_errors
 
 if TYPE_CHECKING:
     from av import VideoFrame
     from av.filter import Graph
 
-Frame = NDArray[np.uint8]
-
 MOVIES = ("mp4", "webm", "webp", "gif", "apng")
 """Kinds of target that need PyAV."""
-
-
-def import_av() -> Any:
-    """PyAV.
-
-    Raises:
-        UnsupportedError: It is not installed.
-    """
-    try:
-        import av
-    except ImportError:
-        raise UnsupportedError(
-            "video and animated pictures need PyAV: pip install 'proxyimg-codec[animate]'"
-        ) from None
-    return av
-
-
-def write_errors() -> tuple[type[Exception], ...]:
-    """What raises where a clip cannot be written."""
-    with contextlib.suppress(UnsupportedError):
-        return (OSError, import_av().FFmpegError)
-    return (OSError,)
 
 
 def movie_of(
@@ -165,7 +139,7 @@ class _Movie:
             context.color_primaries, context.color_trc = 1, 13
             context.colorspace, context.color_range = 1, 1
         self._stream = stream
-        self._input = (width, height, _layout(first))
+        self._input = (width, height, layout_of(first))
 
     @cached_property
     def _converter(self) -> Graph:
@@ -174,14 +148,14 @@ class _Movie:
         if self._coding.is_video:
             flags = "bicubic+accurate_rnd+full_chroma_int+full_chroma_inp"
             steps.insert(0, ("scale", f"flags={flags}:out_color_matrix=bt709:out_range=tv"))
-        return _graph(steps, [self._input])
+        return graph(steps, [self._input])
 
     def add(self, frame: Frame) -> None:
         """Takes the next frame."""
         if self._coding.is_video:
             frame = np.pad(frame, self._pad, mode="edge")
-        self._converter.push(_video_frame(frame, self._count))
-        self.encode(next(_pulled(self._converter)))
+        self._converter.push(video_frame(frame, self._count))
+        self.encode(next(pulled(self._converter)))
 
     def encode(self, picture: VideoFrame) -> None:
         """Takes a frame as the encoder wants it."""
@@ -217,29 +191,29 @@ class _Gif:
         self._spool = file.with_suffix(".frames")
         self._movie = _Movie(file, _gif(loop), first, rate)
         self._count = 0
-        self._input = (first.shape[1], first.shape[0], _layout(first))
-        self._palette = _graph([("palettegen", "stats_mode=full")], [self._input])
+        self._input = (first.shape[1], first.shape[0], layout_of(first))
+        self._palette = graph([("palettegen", "stats_mode=full")], [self._input])
 
     def add(self, frame: Frame) -> None:
         """Takes the next frame."""
         with open(self._spool, "ab") as spool:
             spool.write(frame.data)
-        self._palette.push(_video_frame(frame, self._count))
+        self._palette.push(video_frame(frame, self._count))
         self._count += 1
 
     def finish(self) -> None:
         """Completes the file."""
         self._palette.push(None)
-        palette = next(_pulled(self._palette))
+        palette = next(pulled(self._palette))
         steps = [("paletteuse", "dither=sierra3:diff_mode=rectangle:alpha_threshold=128")]
-        colours = _graph(steps, [self._input, (palette.width, palette.height, palette.format.name)])
+        colours = graph(steps, [self._input, (palette.width, palette.height, palette.format.name)])
         palette.pts = 0
         colours.push(palette, 1)
         colours.push(None, 1)
         with open(self._spool, "rb") as spool:
             for k in range(self._count):
                 frame = np.fromfile(spool, np.uint8, math.prod(self._shape))
-                colours.push(_video_frame(frame.reshape(self._shape), k), 0)
+                colours.push(video_frame(frame.reshape(self._shape), k), 0)
                 self._encode(colours)
         colours.push(None, 0)
         self._encode(colours)
@@ -247,7 +221,7 @@ class _Gif:
         self._movie.finish()
 
     def _encode(self, colours: Graph) -> None:
-        for picture in _pulled(colours):
+        for picture in pulled(colours):
             self._movie.encode(picture)
 
     def close(self) -> None:
@@ -265,39 +239,3 @@ def _lossless_is_no_larger(first: Frame, quality: int) -> bool:
         movie.finish()
         sizes.append(len(buffer.getvalue()))
     return sizes[0] <= sizes[1]
-
-
-def _layout(frame: Frame) -> str:
-    return "rgba" if frame.shape[2] == 4 else "rgb24"
-
-
-def _video_frame(frame: Frame, number: int) -> VideoFrame:
-    """FFmpeg's view of a frame [H, W, 3 or 4]."""
-    picture: VideoFrame = import_av().VideoFrame.from_ndarray(frame, _layout(frame))
-    picture.pts = number
-    return picture
-
-
-def _graph(steps: list[tuple[str, str]], inputs: list[tuple[int, int, str]]) -> Graph:
-    """A chain of FFmpeg's filters; the first has inputs of these widths, heights and layouts."""
-    av = import_av()
-    chain: Graph = av.filter.Graph()
-    chain.threads = 1
-    nodes = [chain.add(*step) for step in steps] + [chain.add("buffersink")]
-    for k, (width, height, layout) in enumerate(inputs):
-        form = av.VideoFormat(layout)
-        source = chain.add_buffer(
-            width=width, height=height, format=form, name=f"in{k}", time_base=Fraction(1)
-        )
-        source.link_to(nodes[0], 0, k)
-    chain.link_nodes(*nodes)
-    chain.configure(auto_buffer=False)
-    return chain
-
-
-def _pulled(chain: Graph) -> Iterator[VideoFrame]:
-    """What the chain has ready."""
-    av = import_av()
-    with contextlib.suppress(av.BlockingIOError, av.EOFError):
-        while True:
-            yield chain.vpull()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -74,27 +74,48 @@ def build(
     blocks, count = _blocks(points)
 
     def block(index: Value) -> Value:
-        at, corner = points.take(index), corners.take(index)
-        result = graph.constant(np.zeros((BLOCK, 4), np.float32))
-        clear = graph.constant(np.ones((BLOCK, 1), np.float32))
-        for layer in reversed(chosen):
-            weight = clear
-            if layer in outlines:
-                covered = coverage(outlines[layer], corner).reshape(-1, 1)
-                weight = clear * covered
-            seen = _seen(picture, layer, at, weight) * weight
-            result = result + seen
-            clear = clear - seen.take(np.array([3]), 1)
-        return result
+        return _composited(picture, chosen, outlines, points.take(index), corners.take(index))
 
     rows = graph.scan(blocks, block).reshape(-1, 4)
     start, axes = np.array([0]), np.array([0])
     result = graph.op("Slice", rows, start, count, axes, name="colour")
+    canvas = {"width": str(picture.width), "height": str(picture.height)}
+    said = _documentation(picture, chosen)
+    return graph.model("proxyimg_renderer", [(result, ["N", 4])], said, canvas)
+
+
+def _documentation(picture: Picture, chosen: Sequence[Layer]) -> str:
     said = [DOCUMENTATION, f"The canvas has {picture.width} by {picture.height} pixels."]
     if picture.opaque and picture.layers[0] in chosen:
         said.append("The picture is opaque: alpha is to be ignored.")
-    canvas = {"width": str(picture.width), "height": str(picture.height)}
-    return graph.model("proxyimg_renderer", [(result, ["N", 4])], "\n".join(said), canvas)
+    return "\n".join(said)
+
+
+def _composited(
+    picture: Picture, chosen: Sequence[Layer], outlines: Mapping[Layer, Value], at: Value,
+    corner: Value,
+) -> Value:  # fmt: skip
+    """Colour float32 [BLOCK, 4] of all layers, front to back.
+
+    Args:
+        picture: What they are layers of.
+        chosen: Them, back to front.
+        outlines: Chords of those that have an outline.
+        at: Points [BLOCK, 2].
+        corner: Corners of the samples around them [BLOCK, 2], as `coverage` takes them.
+    """
+    graph = at.graph
+    result = graph.constant(np.zeros((BLOCK, 4), np.float32))
+    clear = graph.constant(np.ones((BLOCK, 1), np.float32))
+    for layer in reversed(chosen):
+        weight = clear
+        if layer in outlines:
+            covered = coverage(outlines[layer], corner).reshape(-1, 1)
+            weight = clear * covered
+        seen = _seen(picture, layer, at, weight) * weight
+        result = result + seen
+        clear = clear - seen.take(np.array([3]), 1)
+    return result
 
 
 def _blocks(points: Value) -> tuple[Value, Value]:

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..texture import registered_model
+from ..texture.latents import Latents
 from ..texture.network import Floats
-from ..texture.planes import Latents, Planes
+from ..texture.planes import Planes
 from ..texture.synthesis import BANDS, mirrored_indices, wavelet
 from .onnx_graph import Graph, Value
 

@@ -19,12 +19,15 @@ from numpy.typing import NDArray
 from ..io import xml
 from ..io.raster import encode_png
 from ..limits import DEFAULT_LIMITS, Limits
-from ..model import Layer, Pictured
+from ..model import Layer, Picture, Pictured
 from ..render.cache import Cache
 from ..render.pixels import render
 from .common import at_full_opacity, chosen_layers, opacity_text, region_of
 
 THUMBNAIL_SIDE = 256
+
+Draw = Callable[..., NDArray[Any]]
+"""`render.pixels.render`, with some of its arguments given."""
 
 
 def build(
@@ -57,36 +60,54 @@ def build(
     """
     picture = image.picture
     chosen = chosen_layers(picture, layers, background)
-    icc = {k: v for k, v in picture.blocks.items() if k == "icc"}
     draw = partial(render, engine=engine, limits=limits, cache=Cache())
+    drawn = _layers(picture, chosen, partial(draw, dtype=dtype), progress or (lambda count: None))
+    flat = _flat(picture, [v.name for v in chosen if not v.pose.hidden], draw, dtype)
+    return _zipped({"mimetype": b"image/openraster", **drawn, **flat})
+
+
+def _layers(
+    picture: Picture, chosen: Sequence[Layer], draw: Draw, progress: Callable[[int], None]
+) -> dict[str, bytes]:
+    """Files of the layers, front to back, and of the stack that they make."""
     width, height = picture.size
-    parts = {"mimetype": b"image/openraster"}
     size = {"w": str(width), "h": str(height), "xres": "72", "yres": "72"}
     root = ElementTree.Element("image", {"version": "0.0.5", **size})
     stack = ElementTree.SubElement(root, "stack")
     full = at_full_opacity(picture)
+    parts = {}
     for k, layer in reversed(list(enumerate(chosen))):
         region = region_of(picture, layer)
-        pixels, x, y = _cropped(draw(full, layers=[layer.name], region=region, dtype=dtype))
+        pixels, x, y = _cropped(draw(full, layers=[layer.name], region=region))
         source = f"data/layer{k}.png"
-        parts[source] = encode_png(pixels, icc)
+        parts[source] = encode_png(pixels, _profile(picture))
         attributes = _attributes(layer, source, region[0] + x, region[1] + y)
         ElementTree.SubElement(stack, "layer", attributes)
-        if progress:
-            progress(1)
-    parts["stack.xml"] = xml.serialize(root)
-    shown = [layer.name for layer in chosen if not layer.pose.hidden]
+        progress(1)
+    return {**parts, "stack.xml": xml.serialize(root)}
 
-    def flat(width: int, height: int, dtype: Any) -> NDArray[Any]:
-        if not shown:
-            return np.zeros((height, width, 4), dtype)
-        return draw(picture, layers=shown, width=width, height=height, dtype=dtype)
 
-    parts["mergedimage.png"] = encode_png(flat(width, height, dtype), icc)
+def _flat(picture: Picture, shown: list[str], draw: Draw, dtype: Any) -> dict[str, bytes]:
+    """Files of the layers `shown` as one picture, and of its thumbnail."""
+
+    def png(width: int, height: int, dtype: Any) -> bytes:
+        if shown:
+            pixels = draw(picture, layers=shown, width=width, height=height, dtype=dtype)
+        else:
+            pixels = np.zeros((height, width, 4), dtype)
+        return encode_png(pixels, _profile(picture))
+
+    width, height = picture.size
     shrink = min(1.0, THUMBNAIL_SIDE / max(width, height))
-    small = flat(max(round(width * shrink), 1), max(round(height * shrink), 1), np.uint8)
-    parts["Thumbnails/thumbnail.png"] = encode_png(small, icc)
-    return _zipped(parts)
+    small = max(round(width * shrink), 1), max(round(height * shrink), 1)
+    return {
+        "mergedimage.png": png(width, height, dtype),
+        "Thumbnails/thumbnail.png": png(*small, np.uint8),
+    }
+
+
+def _profile(picture: Picture) -> dict[str, bytes]:
+    return {k: v for k, v in picture.blocks.items() if k == "icc"}
 
 
 def _attributes(layer: Layer, source: str, x: int, y: int) -> dict[str, str]:

@@ -49,33 +49,30 @@ def build(
     """
     picture = image.picture
     size = {"width": str(picture.width), "height": str(picture.height)}
-    root = ElementTree.Element(
-        "svg",
-        {
-            "xmlns": NAMESPACE,
-            "xmlns:inkscape": INKSCAPE,
-            **size,
-            "viewBox": f"0 0 {picture.width} {picture.height}",
-        },
-    )
+    spaces = {"xmlns": NAMESPACE, "xmlns:inkscape": INKSCAPE}
+    page = {**spaces, **size, "viewBox": f"0 0 {picture.width} {picture.height}"}
+    root = ElementTree.Element("svg", page)
     full, cache = at_full_opacity(picture), Cache()
     ids = dict(zip(picture.layers, identifiers([v.name for v in picture.layers]), strict=True))
     for layer in chosen_layers(picture, layers, background):
         outline = present_outline(picture, layer)
-        shape = ElementTree.SubElement(root, "rect" if outline is None else "path")
-        shape.set("id", ids[layer])
-        shape.set("inkscape:label", xml.text(layer.name))
-        shape.set("fill", _mean_colour(full, layer, engine, cache))
-        if layer.pose.opacity < OPACITY_MAX:
-            shape.set("opacity", opacity_text(layer))
-        if layer.pose.hidden:
-            shape.set("display", "none")
+        look = _look(layer, ids[layer], _mean_colour(full, layer, engine, cache))
         if outline is None:
-            shape.attrib.update(size)
+            ElementTree.SubElement(root, "rect", {**look, **size})
         else:
-            shape.set("fill-rule", "nonzero")
-            shape.set("d", path_data(outline))
+            drawn = {"fill-rule": "nonzero", "d": path_data(outline)}
+            ElementTree.SubElement(root, "path", {**look, **drawn})
     return xml.serialize(root)
+
+
+def _look(layer: Layer, identifier: str, colour: str) -> dict[str, str]:
+    """Attributes of a layer's shape, but for its geometry."""
+    look = {"id": identifier, "inkscape:label": xml.text(layer.name), "fill": colour}
+    if layer.pose.opacity < OPACITY_MAX:
+        look["opacity"] = opacity_text(layer)
+    if layer.pose.hidden:
+        look["display"] = "none"
+    return look
 
 
 def identifiers(names: Sequence[str]) -> list[str]:

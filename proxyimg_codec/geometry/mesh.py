@@ -7,7 +7,6 @@ A file stores vertices, connectivity and flags; no decoder ever runs a mesher.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,23 +18,15 @@ from numpy.typing import NDArray
 from ..entropy import arrays
 from ..errors import FormatError
 from ..limits import Budget
-from . import deltas
+from . import connectivity
 
 Ints = NDArray[np.int64]
-Edge = tuple[int, int]
-Point = tuple[int, int]
 
 FRACTION_BITS = 10
 """Node positions and all posed geometry are in 1/1024 canvas pixel."""
 
 LEVELS_MAX = 4
 """Most refinements of a base triangle."""
-
-BORDER, NEW, RANKED, FAR = 0, 1, 2, 15
-"""Symbols of a gate: nothing beyond it, a new vertex, the vertex of rank s - 2, any old vertex."""
-
-RANKS = FAR - RANKED
-"""Vertices that have a symbol of their own at a gate."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +95,9 @@ class Mesh:
             ValueError: A triangle is not positive, a directed edge occurs twice, or a vertex
                 belongs to no triangle.
         """
-        return Mesh({**_encode(base), "levels": 0, "splits": b""})
+        placed = {"origin": list(base.origin), "step": list(base.step)}
+        coded = connectivity.encode(base.vertices, base.triangles)
+        return Mesh({**placed, **coded, "levels": 0, "splits": b""})
 
     def split(self, flags: Sequence[NDArray[np.bool_]]) -> Mesh:
         """The mesh with other split flags.
@@ -129,7 +122,9 @@ class Mesh:
         Raises:
             FormatError: The coded mesh is corrupt.
         """
-        return _decode(self.fields, self._where)
+        vertices, triangles = connectivity.decode(self.fields, self._where)
+        (x, y), (across, down) = self.fields["origin"], self.fields["step"]
+        return Base((x, y), (across, down), vertices, triangles)
 
     @cached_property
     def splits(self) -> list[NDArray[np.bool_]]:
@@ -248,219 +243,3 @@ def _close(
         parts = [np.stack(p, axis=1)[split == n].reshape(-1, 3) for n, p in patterns.items()]
         triangles = np.concatenate(parts)
         origin = np.concatenate([np.repeat(origin[split == n], n + 1) for n in patterns])
-
-
-class _Border:
-    """The growing mesh while it is coded: gates are directed edges that wait for a triangle."""
-
-    def __init__(self, count: int) -> None:
-        self.open = np.zeros(count, np.int32)
-        self._x, self._y = np.zeros((2, count), np.int32)
-        self._places: list[Point] = []
-        self.waiting: dict[Edge, int] = {}
-        self.used: set[Edge] = set()
-        self.queue: deque[Edge] = deque()
-
-    def add(self, x: int, y: int) -> int:
-        """A new vertex."""
-        self._x[self.known], self._y[self.known] = x, y
-        self._places.append((x, y))
-        return self.known - 1
-
-    @property
-    def known(self) -> int:
-        """How many vertices there are."""
-        return len(self._places)
-
-    @property
-    def vertices(self) -> NDArray[np.uint8]:
-        """All of them [known, 2]."""
-        return np.array(self._places, np.uint8)
-
-    def at(self, vertex: int) -> Point:
-        """Where a vertex is."""
-        return self._places[vertex]
-
-    def _open(self, edge: Edge, by: int) -> None:
-        """Counts the gates that its ends are at."""
-        for vertex in edge:
-            self.open[vertex] += by
-
-    def next_gate(self) -> tuple[Edge, int] | None:
-        """The next gate and the vertex on its near side."""
-        while self.queue:
-            edge = self.queue.popleft()
-            if edge in self.waiting:
-                near = self.waiting.pop(edge)
-                self._open(edge, -1)
-                return edge, near
-        return None
-
-    def predicted(self, edge: Edge, near: int) -> Point:
-        """The fourth corner of the parallelogram on the far side of a gate."""
-        (ax, ay), (bx, by), (x, y) = self.at(edge[0]), self.at(edge[1]), self.at(near)
-        return ax + bx - x, ay + by - y
-
-    def ranked(self, edge: Edge, near: int) -> Ints:
-        """The first vertices at gates that could close the triangle, nearest to the prediction.
-
-        Of equals the one that was added first; as many as there are symbols for.
-        """
-        at = np.flatnonzero(self.open[: self.known])
-        x, y = self._x.take(at), self._y.take(at)
-        (ax, ay), (bx, by) = self.at(edge[0]), self.at(edge[1])
-        ahead = np.flatnonzero((ax - bx) * y - (ay - by) * x > (ax - bx) * by - (ay - by) * bx)
-        ex, ey = self.predicted(edge, near)
-        distance = (x.take(ahead) - ex) ** 2 + (y.take(ahead) - ey) ** 2
-        if len(ahead) > RANKS:
-            few = np.flatnonzero(distance <= np.partition(distance, RANKS - 1)[RANKS - 1])
-            ahead, distance = ahead[few], distance[few]
-        ranked: Ints = at[ahead[np.argsort(distance, kind="stable")[:RANKS]]]
-        return ranked
-
-    def place_triangle(self, a: int, b: int, c: int) -> bool:
-        """Adds a triangle; false if it is not positive or an edge of it is taken."""
-        (ax, ay), (bx, by), (cx, cy) = self.at(a), self.at(b), self.at(c)
-        edges = ((a, b), (b, c), (c, a))
-        if (bx - ax) * (cy - ay) <= (by - ay) * (cx - ax) or not self.used.isdisjoint(edges):
-            return False
-        for (x, y), far in zip(edges, (c, a, b), strict=True):
-            self.used.add((x, y))
-            if (y, x) in self.waiting:
-                del self.waiting[y, x]
-                self._open((x, y), -1)
-            elif (y, x) not in self.used:
-                self.waiting[x, y] = far
-                self._open((x, y), 1)
-                self.queue.append((x, y))
-        return True
-
-
-def _encode(base: Base) -> dict[str, Any]:
-    beyond: dict[Edge, int] = {}
-    for a, b, c in base.triangles.tolist():
-        beyond |= {(a, b): c, (b, c): a, (c, a): b}
-    if len(beyond) < 3 * len(base.triangles):
-        raise ValueError("a directed edge of the mesh occurs twice")
-    border = _Border(len(base.vertices))
-    new: dict[int, int] = {}
-    old: list[int] = []
-    symbols: list[int] = []
-    far: list[int] = []
-    residuals: list[tuple[int, int]] = []
-
-    def put(vertex: int, expected: Point, ranked: Ints | None) -> int:
-        if vertex not in new:
-            x, y = map(int, base.vertices[vertex])
-            symbols.append(NEW)
-            residuals.append((_wrapped(x - expected[0]), _wrapped(y - expected[1])))
-            old.append(vertex)
-            new[vertex] = border.add(x, y)
-            return new[vertex]
-        rank = np.flatnonzero(ranked == new[vertex]) if ranked is not None else np.zeros(0)
-        if len(rank):
-            symbols.append(RANKED + int(rank[0]))
-        else:
-            symbols.append(FAR)
-            far.append(new[vertex])
-        return new[vertex]
-
-    def place(a: int, b: int, c: int) -> None:
-        if not border.place_triangle(a, b, c):
-            raise ValueError("a triangle of the mesh is not positive")
-
-    for corners in base.triangles.tolist():
-        if (new.get(corners[0], -1), new.get(corners[1], -1)) in border.used:
-            continue
-        last = (0, 0)
-        for vertex in corners:
-            last = border.at(put(vertex, last, None))
-        place(*(new[v] for v in corners))
-        while (gate := border.next_gate()) is not None:
-            (x, y), near = gate
-            apex = beyond.get((old[y], old[x]))
-            if apex is None:
-                symbols.append(BORDER)
-                continue
-            edge = (x, y)
-            place(y, x, put(apex, border.predicted(edge, near), border.ranked(edge, near)))
-    if len(new) < len(base.vertices):
-        raise ValueError("a vertex of the mesh belongs to no triangle")
-    classes, raw = deltas.encode(np.array(residuals, np.int64).T)
-    return {
-        "origin": list(base.origin),
-        "step": list(base.step),
-        "vertices": len(residuals),
-        "gates": len(symbols),
-        "symbols": arrays.encode(
-            np.array(symbols)[None, None], 4, np.ones((1, len(symbols)), bool)
-        ),
-        "far": far,
-        "classes": classes,
-        "deltas": raw,
-    }
-
-
-def _wrapped(difference: int) -> int:
-    """The difference modulo 256 in -128..127."""
-    return (difference + 128) % 256 - 128
-
-
-def _decode(fields: Mapping[str, Any], where: str) -> Base:
-    gates, count = fields["gates"], fields["vertices"]
-    data = arrays.decode(fields["symbols"], (1, 1, gates), 4, np.ones((1, gates), bool))
-    symbols = iter(data.ravel().tolist())
-    far = iter(fields["far"])
-    residuals = iter(deltas.decode(fields["classes"], fields["deltas"], 2, count, where).T.tolist())
-    border = _Border(count)
-    triangles: list[tuple[int, int, int]] = []
-
-    def corrupt(rule: str) -> FormatError:
-        return FormatError("the connectivity of the mesh is corrupt", where, rule=rule)
-
-    def get(symbol: int, expected: Point, ranked: Ints | None) -> int:
-        if symbol == NEW:
-            dx, dy = next(residuals)
-            return border.add((expected[0] + dx) % 256, (expected[1] + dy) % 256)
-        if symbol == FAR:
-            vertex = int(next(far))
-        elif ranked is not None and 0 <= symbol - RANKED < len(ranked):
-            vertex = int(ranked[symbol - RANKED])
-        else:
-            raise corrupt("MSH-5" if ranked is None else "MSH-8")
-        if vertex >= border.known:
-            raise corrupt("MSH-3")
-        return vertex
-
-    def place(a: int, b: int, c: int) -> None:
-        if not border.place_triangle(a, b, c):
-            raise FormatError(
-                "a triangle of the mesh is not positive, or overlaps", where, rule="MSH-2"
-            )
-        triangles.append((a, b, c))
-
-    try:
-        for symbol in symbols:
-            last, corners = (0, 0), []
-            for k in range(3):
-                corners.append(get(next(symbols) if k else symbol, last, None))
-                last = border.at(corners[-1])
-            place(*corners)
-            while (gate := border.next_gate()) is not None:
-                (x, y), near = gate
-                symbol = next(symbols)
-                if symbol != BORDER:
-                    ranked = border.ranked((x, y), near) if symbol > NEW else None
-                    place(y, x, get(symbol, border.predicted((x, y), near), ranked))
-    except StopIteration:
-        raise corrupt("MSH-9") from None
-    if border.known != count or next(far, None) is not None:
-        raise FormatError(
-            "the connectivity of the mesh does not use all its vertices", where, rule="MSH-9"
-        )
-    return Base(
-        (fields["origin"][0], fields["origin"][1]),
-        (fields["step"][0], fields["step"][1]),
-        border.vertices,
-        np.array(triangles, np.int32),
-    )

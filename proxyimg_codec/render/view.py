@@ -91,8 +91,7 @@ def make_view(
     """
     try:
         x, y, w, h = map(operator.index, region or (0, 0, *canvas))
-        width = None if width is None else operator.index(width)
-        height = None if height is None else operator.index(height)
+        width, height = _whole(width), _whole(height)
     except (TypeError, ValueError):
         raise UsageError(
             "width, height and the four numbers of a region must be integers"
@@ -101,25 +100,38 @@ def make_view(
         raise UsageError(
             f"region {x},{y},{w},{h} is empty or leaves the canvas of {canvas[0]}x{canvas[1]}"
         )
-    if scale is not None:
-        if width is not None or height is not None:
-            raise UsageError("give either a scale or a width and height")
-        if not (np.isfinite(scale) and scale > 0):
-            raise UsageError(f"scale {scale} is not a positive number")
-        if scale * max(w, h) > SIDE_MAX:
-            raise LimitError(
-                f"scale {scale:g} makes a picture of more than {SIDE_MAX} pixels a side"
-            )
-        width, height = max(round(w * scale), 1), max(round(h * scale), 1)
-    if width is None and height is None:
-        width, height = w, h
-    elif width is None:
-        width = max(round(Fraction(w * (height or 0), h)), 1)
-    elif height is None:
-        height = max(round(Fraction(h * width, w)), 1)
-    assert height is not None
+    if scale is None:
+        width, height = _completed(width, height, (w, h))
+    elif width is not None or height is not None:
+        raise UsageError("give either a scale or a width and height")
+    else:
+        width, height = _scaled(scale, (w, h))
     if width < 1 or height < 1:
         raise UsageError(f"output size {width}x{height} is empty")
     if max(width, height) > SIDE_MAX:
         raise LimitError(f"the output would have more than {SIDE_MAX} pixels a side")
     return View(x, y, w, h, width, height)
+
+
+def _whole(number: int | None) -> int | None:
+    return None if number is None else operator.index(number)
+
+
+def _scaled(scale: float, region: tuple[int, int]) -> tuple[int, int]:
+    """Output columns and rows of a region of this width and height, at least 1 each."""
+    if not (np.isfinite(scale) and scale > 0):
+        raise UsageError(f"scale {scale} is not a positive number")
+    if scale * max(region) > SIDE_MAX:
+        raise LimitError(f"scale {scale:g} makes a picture of more than {SIDE_MAX} pixels a side")
+    width, height = (max(round(n * scale), 1) for n in region)
+    return width, height
+
+
+def _completed(width: int | None, height: int | None, region: tuple[int, int]) -> tuple[int, int]:
+    """Output columns and rows, of which at most one follows from the other and the region's."""
+    w, h = region
+    if height is None:
+        return region if width is None else (width, max(round(Fraction(h * width, w)), 1))
+    if width is None:
+        return max(round(Fraction(w * height, h)), 1), height
+    return width, height

@@ -2,35 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..entropy import arrays, laplace, rans
+from ..entropy import arrays, laplace
 from ..errors import FormatError
-from ..native import kernel
-from . import context, context_native, registered_model, synthesis
+from . import context, registered_model, synthesis
 from .context import Ints
+from .latents import SHIFT_ORIGIN, Decoder, Latents, decode, encode, steps
 from .network import Floats
-
-SHIFT_ORIGIN = 8
-"""A stored shift of the scale index is greater by this."""
-
-
-class Latents(NamedTuple):
-    """Whole numbers that a raster is made of.
-
-    Attributes:
-        levels: int32 [9, h, w] of levels 1, 2, ..; channel 3 * colour + band.
-        lowest: int32 [3, h, w].
-    """
-
-    levels: tuple[Ints, ...]
-    lowest: Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,10 +63,7 @@ class Planes:
         Raises:
             FormatError: The stream is corrupt.
         """
-        coder = _Decoder(self.packed["data"], self.packed["escapes"])
-        found = _code(coder, self.packed, self.support, None)
-        coder.finish(self.where)
-        return found
+        return decode(self.packed, self.support, self.where)
 
     @cached_property
     def raster(self) -> Floats:
@@ -164,10 +146,8 @@ def encoded(
         "cell": cell,
         "support": coded_support,
     }
-    coder = _Encoder()
-    _code(coder, fields, support, latents)
-    fields["escapes"], fields["data"] = coder.escapes(), coder.stream.finish()
-    return Planes(fields)
+    data, escapes = encode(fields, support, latents)
+    return Planes({**fields, "escapes": escapes, "data": data})
 
 
 def salvaged(planes: Planes) -> tuple[Planes, int]:
@@ -189,8 +169,8 @@ def salvaged(planes: Planes) -> tuple[Planes, int]:
     packed, support, where = planes.packed, planes.support, planes.where
     found: list[Ints] = []
     try:
-        coder = _Decoder(_cut(packed["data"]), packed["escapes"])
-        for latents in _steps(coder, packed, support, None):
+        coder = Decoder(_cut(packed["data"]), packed["escapes"])
+        for latents in steps(coder, packed, support, None):
             found.append(latents)
         coder.finish(where)
     except FormatError as error:
@@ -227,23 +207,6 @@ def cells_of(size: tuple[int, int], cell: int) -> tuple[int, int]:
     return -(-size[1] >> cell), -(-size[0] >> cell)
 
 
-def support_at(
-    cells: NDArray[np.bool_], cell: int, size: tuple[int, int], level: int, levels: int
-) -> NDArray[np.bool_]:
-    """Positions of a level that have latents: those over a sample of a stored cell."""
-    columns, rows = (-(-n >> levels) << levels for n in size)
-    out = np.zeros((rows >> level, columns >> level), bool)
-    if level < cell:
-        fine = cells.repeat(1 << (cell - level), 0).repeat(1 << (cell - level), 1)
-        h, w = -(-size[1] >> level), -(-size[0] >> level)
-        out[:h, :w] = fine[:h, :w]
-        return out
-    by = level - cell
-    i, j = np.nonzero(cells)
-    out[i >> by, j >> by] = True
-    return out
-
-
 def _scale_of(plane: Ints) -> int:
     """Scale index for the differences of a lowest plane from their prediction.
 
@@ -261,179 +224,3 @@ def _predicted(plane: Ints) -> Ints:
     mean: Ints = 8 * (up + left)
     mean[0], mean[:, 0] = 16 * left[0], 16 * up[:, 0]
     return mean
-
-
-class _Encoder:
-    """Puts latents into a stream."""
-
-    def __init__(self) -> None:
-        self.stream = rans.Encoder()
-        self._escapes: list[NDArray[np.int64]] = []
-
-    def code(
-        self, values: NDArray[np.int64], mean: NDArray[np.int64], scale: NDArray[np.int64]
-    ) -> NDArray[np.int64]:
-        at = laplace.locate(mean, scale)
-        there = at.row >= 0
-        row, centre, shift = (v[there] for v in at)
-        table = laplace.tables()
-        kept = values[there]
-        off = (kept >> shift) - centre
-        reach = table.reach[row]
-        escape = np.abs(off) > reach
-        symbol = np.where(escape, 2 * reach + 1, off + reach)
-        start = table.ends[row, symbol].astype(np.int64)
-        self.stream.put(start, table.ends[row, symbol + 1] - start)
-        deep = shift > 0
-        if deep.any():
-            width = rans.SCALE_BITS - shift[deep]
-            low = kept[deep] & ((1 << shift[deep]) - 1)
-            self.stream.put(low << width, 1 << width)
-        if escape.any():
-            self._escapes.append(off[escape])
-        return np.where(there, values, 0)
-
-    def level(self, at: context_native.Place, values: Ints | None) -> Ints:
-        """Puts a whole level, in the compiled kernel."""
-        assert values is not None
-        latents, escapes = context_native.encode(at, values, self.stream)
-        self._escapes.append(escapes)
-        return latents
-
-    def escapes(self) -> bytes:
-        """The differences that have no symbol: zigzag, 7 bits a byte, low first."""
-        out = bytearray()
-        for value in np.concatenate(self._escapes).tolist() if self._escapes else ():
-            n = 2 * value if value >= 0 else -2 * value - 1
-            while n > 127:
-                out.append(n & 127 | 128)
-                n >>= 7
-            out.append(n)
-        return bytes(out)
-
-
-class _Decoder:
-    """Takes latents from a stream."""
-
-    def __init__(self, data: bytes, escapes: bytes) -> None:
-        self._stream = rans.Decoder(data)
-        self._data, self._escapes, self._at = data, escapes, 0
-
-    def code(
-        self, values: NDArray[np.int64], mean: NDArray[np.int64], scale: NDArray[np.int64]
-    ) -> NDArray[np.int64]:
-        at = laplace.locate(mean, scale)
-        there = np.flatnonzero(at.row >= 0)
-        out = np.zeros(len(mean), np.int64)
-        if not len(there):
-            return out
-        row, centre, shift = (v[there] for v in at)
-        table = laplace.tables()
-        symbol = self._stream.lookup(table.ends, row)
-        reach = table.reach[row]
-        off = symbol - reach
-        escape = np.flatnonzero(off > reach)
-        deep = np.flatnonzero(shift)
-        low = self._stream.raw(shift[deep]) if len(deep) else 0
-        if len(escape):
-            off[escape] = [self._escape() for _ in escape]
-        off += centre
-        off <<= shift
-        off[deep] += low
-        if (np.abs(off) >= context.LIMIT).any():
-            raise FormatError(context.BAD_LATENT, rule="PYR-12")
-        out[there] = off
-        return out
-
-    def level(self, at: context_native.Place, values: Ints | None) -> Ints:
-        """Takes a whole level, in the compiled kernel."""
-        latents, self._at = context_native.decode(at, self._stream, self._escapes, self._at)
-        return latents
-
-    def _escape(self) -> int:
-        n = shift = 0
-        while True:
-            if self._at >= len(self._escapes) or shift > 21:
-                raise FormatError(context.BAD_ESCAPES, rule="PYR-13")
-            byte = self._escapes[self._at]
-            self._at += 1
-            n |= (byte & 127) << shift
-            shift += 7
-            if byte < 128:
-                return -(n + 1) // 2 if n & 1 else n // 2
-
-    def finish(self, where: str) -> None:
-        """Checks that everything was used.
-
-        Raises:
-            FormatError: Something is left over.
-        """
-        self._stream.finish()
-        for at, data, rule in (
-            (self._at, self._escapes, "PYR-13"), (self._stream.end, self._data, "PYR-8"),
-        ):  # fmt: skip
-            if at != len(data):
-                raise FormatError("bytes are left over after the latents", where, rule=rule)
-
-
-def _code(
-    coder: _Encoder | _Decoder, fields: Mapping[str, Any], cells: NDArray[np.bool_],
-    values: Latents | None,
-) -> Latents:  # fmt: skip
-    """Codes all latents."""
-    lowest, *found = _steps(coder, fields, cells, values)
-    return Latents(tuple(found[::-1]), lowest)
-
-
-def _steps(
-    coder: _Encoder | _Decoder, fields: Mapping[str, Any], cells: NDArray[np.bool_],
-    values: Latents | None,
-) -> Iterator[Ints]:  # fmt: skip
-    """Codes and gives the lowest planes, then each level, coarsest first."""
-    weights = registered_model.registered(fields["model"])
-    levels, step, size = fields["levels"], fields["step"], fields["size"]
-    columns, rows = (-(-n >> levels) for n in size)
-    lowest = _code_lowest(coder, fields, (rows, columns), values)
-    yield lowest
-    plain = lowest << 4
-    parent = np.zeros((9, -(-rows // 2), -(-columns // 2)), np.int32)
-    for level in range(levels, 0, -1):
-        shifts = fields["shifts"][2 * level - 2 : 2 * level]
-        here = context.LevelCoder(
-            weights.context[min(level, registered_model.LEVEL_SETS) - 1],
-            step,
-            level <= fields["grey"],
-            (shifts[0] - SHIFT_ORIGIN, shifts[1] - SHIFT_ORIGIN),
-        )
-        support = support_at(cells, fields["cell"], size, level, levels)
-        given = None if values is None else values.levels[level - 1]
-        if kernel.available():
-            parent = coder.level(context_native.Place(here, plain, parent, support), given)
-        else:
-            parent = here.code(coder, plain, parent, support, given)
-        yield parent
-        if level > 1:
-            plain = context.next_plain(plain, parent)
-
-
-def _code_lowest(
-    coder: context.Coder, fields: Mapping[str, Any], shape: tuple[int, int], values: Latents | None
-) -> Ints:
-    """Codes the lowest planes by x + y ascending, each predicted from above and left."""
-    h, w = shape
-    scale = np.array(fields["lowest"], np.int64)
-    count = len(scale)
-    out = np.zeros((3, h, w), np.int32)
-    for t in range(h + w - 1):
-        i = np.arange(max(t - w + 1, 0), min(t, h - 1) + 1)
-        j = t - i
-        up, left = out[:count, i - 1, j], out[:count, i, j - 1]
-        mean = np.where(i == 0, 16 * left, np.where(j == 0, 16 * up, 8 * (up + left)))
-        if t == 0:
-            mean[:] = 0
-        given = np.zeros((count, len(i)), np.int64)
-        if values is not None:
-            given[:] = values.lowest[:count, i, j]
-        coded = coder.code(given.T.ravel(), mean.T.astype(np.int64).ravel(), np.tile(scale, len(i)))
-        out[:count, i, j] = coded.reshape(-1, count).T
-    return out

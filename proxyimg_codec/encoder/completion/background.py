@@ -59,37 +59,73 @@ def complete(
         raise UnsupportedError("--background complete needs torch") from None
     torch.set_num_threads(1)  # sums, and so the file, would depend on the number of threads
     plane = problem.planes[0]
+    codes = _Codes(plane, state, stored)
     pixels, weight = _hidden_pixels(plane, stored)
-    table = torch.from_numpy(state.codes[: plane.size].copy())
-    step = torch.from_numpy(state.code_steps[0])
-    hidden = torch.from_numpy(~stored.ravel())
-    start = fill(quantize(table.numpy(), state.code_steps[0], state.code_bits).T.reshape(
-        -1, plane.rows, plane.columns), stored)  # fmt: skip
-    size = tuple(max(8, n // DELTA) for n in plane.box[:1:-1])
-    small = _small_grid(start / (1 << FRACTION_BITS), size) * step[None, :, None, None]
-    small.requires_grad_()
-    adam = torch.optim.Adam([small], lr=RATE)
-    net = [
-        torch.from_numpy(a)
-        for (w, b), s in zip(
-            rows_of(problem.shape, state.weights),
-            np.split(state.row_steps, np.cumsum([o for _, o in problem.shape.layers])[:-1]),
-            strict=True,
-        )
-        for a in (quantize(w, s[:, None], state.net_bits) * s[:, None], b)
-    ]
+    net = _network(problem, state)
+    adam = torch.optim.Adam([codes.small], lr=RATE)
     rng = np.random.default_rng([settings.seed, 2])
     for _ in range(STEPS):
         at = rng.integers(len(pixels), size=BATCH)
-        codes = _with_hidden(table, hidden, small, plane, step, state.code_bits)
-        loss = GAMMA * _variation(codes, net, plane, pixels[at], weight[at], problem.shape.octaves)
+        loss = GAMMA * _variation(
+            codes.all(), net, plane, pixels[at], weight[at], problem.shape.octaves
+        )
         adam.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]  # untyped in torch's stubs
         adam.step()
     with torch.no_grad():
-        codes = _with_hidden(table, hidden, small, plane, step, state.code_bits)
-    state.codes[: plane.size] = codes.numpy()
+        state.codes[: plane.size] = codes.all().numpy()
     return np.ones_like(stored)
+
+
+class _Codes:
+    """Codes of the back layer: visible ones stay, hidden ones come from a small grid.
+
+    Attributes:
+        small: float32 [1, D, h, w] the small grid, which starts as the diffused codes.
+    """
+
+    def __init__(self, plane: Plane, state: State, stored: NDArray[np.bool_]) -> None:
+        import torch
+
+        self._size, self._bits = (plane.rows, plane.columns), state.code_bits
+        self._visible = torch.from_numpy(state.codes[: plane.size].copy())
+        self._step = torch.from_numpy(state.code_steps[0])
+        self._hidden = torch.from_numpy(~stored.ravel())[:, None]
+        known = quantize(self._visible.numpy(), state.code_steps[0], self._bits)
+        full = fill(known.T.reshape(-1, *self._size), stored) / (1 << FRACTION_BITS)
+        size = tuple(max(8, n // DELTA) for n in plane.box[:1:-1])
+        self.small = _resized(torch.from_numpy(full.astype(np.float32))[None], size)
+        self.small = (self.small * self._step[None, :, None, None]).requires_grad_()
+
+    def all(self) -> torch.Tensor:
+        """Codes [rows * columns, D]; hidden ones are rounded, straight through."""
+        import torch
+
+        full = _resized(self.small, self._size)
+        rows = full[0].permute(1, 2, 0).reshape(-1, len(self._step))
+        top = (1 << (self._bits - 1)) - 1
+        rounded = torch.clamp(torch.round(rows / self._step), -top - 1, top) * self._step
+        return torch.where(self._hidden, rows + (rounded - rows).detach(), self._visible)
+
+
+def _resized(grid: torch.Tensor, size: tuple[int, ...]) -> torch.Tensor:
+    """A grid [1, D, h, w] of another size, interpolated."""
+    import torch
+
+    return torch.nn.functional.interpolate(grid, size, mode="bilinear", align_corners=True)
+
+
+def _network(problem: Problem, state: State) -> list[torch.Tensor]:
+    """Weights [out, in], as they will be stored, and biases [out] of each linear layer in turn."""
+    import torch
+
+    ends = np.cumsum([outputs for _, outputs in problem.shape.layers])[:-1]
+    steps = np.split(state.row_steps, ends)
+    return [
+        torch.from_numpy(a)
+        for (w, b), s in zip(rows_of(problem.shape, state.weights), steps, strict=True)
+        for a in (quantize(w, s[:, None], state.net_bits) * s[:, None], b)
+    ]
 
 
 def _hidden_pixels(plane: Plane, stored: NDArray[np.bool_]) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -102,33 +138,6 @@ def _hidden_pixels(plane: Plane, stored: NDArray[np.bool_]) -> tuple[NDArray[Any
     pixels = np.argwhere(wide > 0)
     rim = (wide != narrow)[wide > 0]
     return pixels, np.where(rim, BETA, 1.0).astype(np.float32)
-
-
-def _small_grid(codes: NDArray[np.float64], size: tuple[int, ...]) -> torch.Tensor:
-    """[1, D, *size]: the diffused codes, reduced, as a start."""
-    import torch
-
-    full = torch.from_numpy(codes.astype(np.float32))[None]
-    return torch.nn.functional.interpolate(full, size, mode="bilinear", align_corners=True)
-
-
-def _with_hidden(
-    table: torch.Tensor,
-    hidden: torch.Tensor,
-    small: torch.Tensor,
-    plane: Plane,
-    step: torch.Tensor,
-    bits: int,
-) -> torch.Tensor:
-    """The table with hidden rows taken from the small grid, rounded (straight-through)."""
-    import torch
-
-    size = (plane.rows, plane.columns)
-    full = torch.nn.functional.interpolate(small, size, mode="bilinear", align_corners=True)
-    rows = full[0].permute(1, 2, 0).reshape(-1, len(step))
-    top = (1 << (bits - 1)) - 1
-    rounded = torch.clamp(torch.round(rows / step), -top - 1, top) * step
-    return torch.where(hidden[:, None], rows + (rounded - rows).detach(), table)
 
 
 def _variation(

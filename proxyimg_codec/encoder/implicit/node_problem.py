@@ -214,8 +214,8 @@ def _locate(
     faces = warp.faces(np.zeros(2), np.ones(2), plane.box)
     column, row = (np.floor(place) - plane.box[:2]).astype(np.int64).T
     located = warp.locate(place[:, 0], place[:, 1], faces[row, column])
-    assert located.face is not None
-    assert located.weights is not None
+    assert located.face is not None, "a meshed warp locates it"
+    assert located.weights is not None, "a meshed warp locates it"
     nodes = mesh.refined.faces[located.face]
     weights = located.weights
     if distance:

@@ -115,53 +115,124 @@ def reconstruct(
 
     rng = np.random.default_rng([seed, 1])
     every = torch.arange(count, device=model.codes.device)
-    outputs, importance = _outputs(model, features(model.codes, every).detach())
-    codes, net = model.codes, list(model.net)
+    goals = _goals(model, features(model.codes, every).detach())
+    net: list[Any] = []
+    codes: Any = None
     hidden: Any = None
-    for number, (start, stop) in enumerate(model.blocks):
-        choices = [Choice(net[2 * k], model.row_steps[k], bits[1]) for k in range(start, stop)]
-        biases = [net[2 * k + 1].clone().requires_grad_() for k in range(start, stop)]
-        if start == 0:
-            choices.append(Choice(codes, model.code_steps, bits[0]))
+
+    def inputs(soft_codes: Any, at: Any) -> Any:
+        return features(soft_codes, at) if hidden is None else hidden[at]
+
+    for number, (span, goal) in enumerate(zip(model.blocks, goals, strict=True)):
+        block = _Block(model, span, bits)
+        done, next_done = (steps * n // len(goals) for n in (number, number + 1))
+        block.optimize(inputs, goal, next_done - done, rng, progress)
+        if block.codes is not None:
+            codes = block.codes.hard()
+        own = block.rounded()
+        net += own
+        x = features(codes, every) if hidden is None else hidden
+        hidden = model.activate(x, own, *span)
+    return codes, net
+
+
+@dataclass(frozen=True, eq=False)
+class _Goal:
+    """What a block of the float model gives.
+
+    Attributes:
+        outputs: [n, width] at the calibration points.
+        importance: [n, width] of a squared error there: the squared derivative of the colour,
+            summed over its channels.
+    """
+
+    outputs: Any
+    importance: Any
+
+    def loss(self, outputs: Any, at: Any) -> Any:
+        """The mean weighted squared error of outputs [batch, width] at points `at` [batch]."""
+        off = outputs - self.outputs[at]
+        return (off**2 * self.importance[at]).sum(1).mean()
+
+
+class _Block:
+    """A block while its choices are open.
+
+    Attributes:
+        codes: The choice of the codes, in the first block.
+    """
+
+    def __init__(self, model: Model, span: tuple[int, int], bits: tuple[int, int]) -> None:
+        """The block of linear layers `span`: first, last + 1."""
+        self._model, self._span = model, span
+        layers = range(*span)
+        self._weights = [Choice(model.net[2 * k], model.row_steps[k], bits[1]) for k in layers]
+        self._biases = [model.net[2 * k + 1].clone().requires_grad_() for k in layers]
+        first = span[0] == 0
+        self.codes = Choice(model.codes, model.code_steps, bits[0]) if first else None
+
+    @property
+    def _choices(self) -> list[Choice]:
+        return self._weights if self.codes is None else [*self._weights, self.codes]
+
+    def optimize(
+        self,
+        inputs: Callable[[Any, Any], Any],
+        goal: _Goal,
+        steps: int,
+        rng: np.random.Generator,
+        progress: Progress | None,
+    ) -> None:
+        """Finds choices and biases.
+
+        Args:
+            inputs: Inputs of the block, from the codes if they are its own, and the indices of
+                calibration points.
+            goal: What its outputs should be.
+            steps: Optimizer steps.
+            rng: Draws the batches.
+            progress: Told how many steps were done.
+        """
+        import torch
+
         adam = torch.optim.Adam(
             [
-                {"params": [c.logit for c in choices], "lr": RATE},
-                {"params": biases, "lr": BIAS_RATE},
+                {"params": [c.logit for c in self._choices], "lr": RATE},
+                {"params": self._biases, "lr": BIAS_RATE},
             ]
         )
-        count_here = steps * (number + 1) // len(model.blocks) - steps * number // len(model.blocks)
-        for i in range(count_here):
-            at = torch.from_numpy(rng.integers(count, size=BATCH)).to(every.device)
-            values = [c.soft() for c in choices]
-            x = hidden[at] if start else features(values.pop(), at)
-            part = [p for pair in zip(values, biases, strict=True) for p in pair]
-            off = model.activate(x, part, start, stop) - outputs[number][at]
-            loss = (off**2 * importance[number][at]).sum(1).mean()
-            t = (i / count_here - WARM_UP) / (1 - WARM_UP)
+        points, device = len(goal.outputs), goal.outputs.device
+        for i in range(steps):
+            at = torch.from_numpy(rng.integers(points, size=BATCH)).to(device)
+            loss = goal.loss(self._outputs(inputs, at), at)
+            t = (i / steps - WARM_UP) / (1 - WARM_UP)
             if t > 0:
                 sharp = SHARP[0] + (SHARP[1] - SHARP[0]) * t
-                loss = loss + WEIGHT * sum(c.drive(sharp) for c in choices)
+                loss = loss + WEIGHT * sum(c.drive(sharp) for c in self._choices)
             adam.zero_grad()
             loss.backward()
             adam.step()
             if progress:
                 progress(1)
-        values = [c.hard() for c in choices]
-        if start == 0:
-            codes = values.pop()
-            hidden = features(codes, every)
-        net[2 * start : 2 * stop] = [
-            p.detach() for pair in zip(values, biases, strict=True) for p in pair
-        ]
-        hidden = model.activate(hidden, net[2 * start : 2 * stop], start, stop)
-    return codes, net
+
+    def _outputs(self, inputs: Callable[[Any, Any], Any], at: Any) -> Any:
+        """Outputs [batch, width] while choices are open."""
+        weights = [c.soft() for c in self._weights]
+        x = inputs(None if self.codes is None else self.codes.soft(), at)
+        net = [p for pair in zip(weights, self._biases, strict=True) for p in pair]
+        return self._model.activate(x, net, *self._span)
+
+    def rounded(self) -> list[Any]:
+        """Weights [out, in] as they will be stored, and biases [out], of each layer in turn."""
+        weights = [c.hard() for c in self._weights]
+        return [p.detach() for pair in zip(weights, self._biases, strict=True) for p in pair]
 
 
-def _outputs(model: Model, features: Any) -> tuple[list[Any], list[Any]]:
-    """Outputs [n, width] of each block of the float model, and the importance of their errors.
+def _goals(model: Model, features: Any) -> list[_Goal]:
+    """What each block should give.
 
-    Importance is the squared derivative of the colour, summed over its channels: the diagonal of
-    the Gauss-Newton matrix, where BRECQ takes that of the Fisher information.
+    The importance of errors is the diagonal of the Gauss-Newton matrix, where BRECQ takes that of
+    the Fisher information.
     """
     import torch
 
@@ -175,4 +246,4 @@ def _outputs(model: Model, features: Any) -> tuple[list[Any], list[Any]]:
         slopes = torch.autograd.grad(x[:, channel].sum(), outputs, retain_graph=True)
         for total, slope in zip(importance, slopes, strict=True):
             total += slope**2
-    return [x.detach() for x in outputs], importance
+    return [_Goal(x.detach(), i) for x, i in zip(outputs, importance, strict=True)]

@@ -11,12 +11,15 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from ...texture import planes as coded
+from ...texture.latents import Latents, support_at
 from ...texture.network import Floats
-from ...texture.planes import Latents, Planes
+from ...texture.planes import Planes
 from . import refine
 from .load import load
-from .model import LEVELS, LOG_SCALES, Model
-from .rate import bits_at
+from .model import LEVELS, Model
+from .refine import Target
+from .shifts import Sample, best_shift
+from .window import Window
 
 NUMBER = 1
 """The registered model that is used."""
@@ -30,11 +33,8 @@ WINDOW, MARGIN = 768, 64
 REACH = 256
 """Samples that the analysis of a window sees beyond it: its coarsest filters are that long."""
 
-SHIFTS = range(-8, 8)
-"""Shifts of the scale index that a file can hold."""
-
 SPARSE = 3
-"""They are found on every third latent, across and down."""
+"""Shifts of the scale index are found on every third latent, across and down."""
 
 
 class Effort(NamedTuple):
@@ -134,7 +134,7 @@ class _Job:
         cells = np.ones(coded.cells_of(r.size, CELL), bool) if r.cells is None else r.cells
         masks = []
         for level in range(1, self.count + 1):
-            at = coded.support_at(cells, CELL, r.size, level, self.count)
+            at = support_at(cells, CELL, r.size, level, self.count)
             mask = np.repeat(at[None], 9, 0)
             mask[3:] &= not r.grey
             masks.append(_tensor(mask.astype(np.float32)))
@@ -152,9 +152,7 @@ class _Job:
         for box in self.windows(REACH):
             part = self.picture[:, :, box.outer[0], box.outer[1]]
             own = refine.shrunk(self.model.analyse(part, self.step, self.count), refine.DEAD_ZONE)
-            for whole, new, level in zip(found, own, self._depths(), strict=True):
-                inner, offset = box.at(level, inner=True), box.inside(level)
-                whole[:, :, inner[0], inner[1]] = new[:, :, offset[0], offset[1]]
+            self._keep(box, found, own)
         if self.raster.grey:
             found[-1][:, 1:] = 0
         if self.support is not None:
@@ -179,32 +177,15 @@ class _Job:
 
     def refine(self, box: Window, effort: Effort, seed: int, tick: Callable[[int], None]) -> None:
         """Refines the latents of a window; those of windows before it stay."""
-        outer = box.outer
-        depths = self._depths()
-        now = [
-            y[:, :, (a := box.at(level))[0], a[1]]
-            for y, level in zip(self.latents, depths, strict=True)
-        ]
-        free = None
-        if box.partial:
-            free = [box.mask(level).expand(1, y.shape[1], -1, -1) for y, level in
-                    zip(now, depths, strict=True)]  # fmt: skip
-        support = self.support and [
-            m[:, :, (a := box.at(level))[0], a[1]]
-            for m, level in zip(self.support, depths, strict=False)
-        ]
-        weight = None if self.weight is None else self.weight[:, :, outer[0], outer[1]]
-        target = refine.Target(
-            self.picture[:, :, outer[0], outer[1]], weight, support, free, self.step, self.shifts
-        )
+        now = self._seen(box, self.latents)
+        target = self._target(box, now)
         if self.raster.structural:
             # Moves by one rely on the curvature of the squared error.
             target = refine.structural(self.model, target, now)
             effort = Effort(effort.steps + effort.rounds, 0)
-        samples = box.samples
 
         def done() -> None:
-            tick(samples)
+            tick(box.samples)
 
         best = now
         try:
@@ -213,10 +194,33 @@ class _Job:
             if effort.rounds:
                 best = refine.improved(self.model, target, best, effort.rounds, seed, done)
         finally:
-            # What lies around has suffered from the edges of the window.
-            for whole, new, level in zip(self.latents, best, depths, strict=True):
-                at, within = box.at(level, inner=True), box.inside(level)
-                whole[:, :, at[0], at[1]] = new[:, :, within[0], within[1]]
+            self._keep(box, self.latents, best)
+
+    def _target(self, box: Window, now: list[Tensor]) -> Target:
+        """What the latents `now` of a window should show, and which of them may change."""
+        rows, columns = box.outer
+        free = None
+        if box.partial:
+            masks = map(box.mask, self._depths())
+            free = [m.expand(1, y.shape[1], -1, -1) for y, m in zip(now, masks, strict=True)]
+        support = None if self.support is None else self._seen(box, self.support)
+        weight = None if self.weight is None else self.weight[:, :, rows, columns]
+        picture = self.picture[:, :, rows, columns]
+        return Target(picture, weight, support, free, self.step, self.shifts)
+
+    def _seen(self, box: Window, arrays: list[Tensor]) -> list[Tensor]:
+        """What a window sees of arrays of levels 1, 2, .., which may end with the lowest planes."""
+        places = map(box.at, self._depths())
+        return [y[:, :, i, j] for y, (i, j) in zip(arrays, places, strict=False)]
+
+    def _keep(self, box: Window, arrays: list[Tensor], found: list[Tensor]) -> None:
+        """Puts what a window is responsible for, of what was found for all that it sees.
+
+        What lies around has suffered from the edges of the window.
+        """
+        for whole, new, level in zip(arrays, found, self._depths(), strict=True):
+            (i, j), within = box.at(level, inner=True), box.inside(level)
+            whole[:, :, i, j] = new[:, :, within[0], within[1]]
 
     def planes(self) -> Planes:
         """The coded planes of what was found."""
@@ -231,13 +235,10 @@ class _Job:
     @torch.no_grad()
     def _shifts(self) -> tuple[int, ...]:
         """The shifts of the scale index that take the fewest bits for the present latents."""
-        samples: list[list[_Sample]] = [[] for _ in range(2 * self.count)]
+        samples: list[list[Sample]] = [[] for _ in range(2 * self.count)]
         few = slice(None, None, SPARSE)
         for box in self.windows():
-            own = [
-                torch.round(y[:, :, (a := box.at(level))[0], a[1]])
-                for y, level in zip(self.latents, self._depths(), strict=True)
-            ]
+            own = [torch.round(y) for y in self._seen(box, self.latents)]
             for k, p in enumerate(self.model.likelihoods(own, self.step)):
                 y, mean, scale = (v[:, :, few, few] for v in (own[k], *p))
                 mask = torch.ones(1, 9, 1, 1)
@@ -245,97 +246,9 @@ class _Job:
                     a = box.at(k + 1)
                     mask = self.support[k][:, :, a[0], a[1]][:, :, few, few]
                 for group, at in enumerate((slice(3), slice(3, 9))):
-                    part = _Sample(y[:, at] - mean[:, at], scale[:, at], mask[:, at])
+                    part = Sample(y[:, at] - mean[:, at], scale[:, at], mask[:, at])
                     samples[2 * k + group].append(part)
-        return tuple(_best_shift(part) for part in samples)
-
-
-class _Sample(NamedTuple):
-    """Some latents less their mean, the log of their scale, and which of them are coded."""
-
-    offset: Tensor
-    log_scale: Tensor
-    mask: Tensor
-
-    def bits(self, shift: int) -> float:
-        """Bits with a shift of the scale index."""
-        scale = (self.log_scale + shift / 8).clamp(*LOG_SCALES)
-        return float((bits_at(self.offset, scale) * self.mask).sum())
-
-
-def _best_shift(samples: list[_Sample]) -> int:
-    """The shift that takes the fewest bits, found downhill from none."""
-    spent: dict[int, float] = {}
-
-    def cost(shift: int) -> float:
-        if shift not in spent:
-            spent[shift] = sum(part.bits(shift) for part in samples) + 1e-3 * abs(shift)
-        return spent[shift]
-
-    best = 0
-    while (near := min((best - 1, best, best + 1), key=cost)) != best and near in SHIFTS:
-        best = near
-    return best
-
-
-class Window(NamedTuple):
-    """A window: slices of rows and columns of the raster, in samples.
-
-    Attributes:
-        inner: What it is responsible for.
-        outer: What it sees.
-        partial: Whether there are other windows.
-    """
-
-    inner: tuple[slice, slice]
-    outer: tuple[slice, slice]
-    partial: bool
-
-    @classmethod
-    def of(cls, corner: tuple[int, int], side: int, margin: int, shape: tuple[int, int]) -> Window:
-        """The window at a corner, of a raster of `shape`."""
-        inner = [slice(c, min(c + side, n)) for c, n in zip(corner, shape, strict=True)]
-        outer = [
-            slice(max(s.start - margin, 0), min(s.stop + margin, n))
-            for s, n in zip(inner, shape, strict=True)
-        ]
-        partial = any(s.stop - s.start < n for s, n in zip(inner, shape, strict=True))
-        return cls((inner[0], inner[1]), (outer[0], outer[1]), partial)
-
-    @property
-    def samples(self) -> int:
-        """Samples it is responsible for."""
-        rows, columns = self.inner
-        return int((rows.stop - rows.start) * (columns.stop - columns.start))
-
-    def at(self, level: int, inner: bool = False) -> tuple[slice, slice]:
-        """The window among the latents of a level."""
-        rows, columns = (
-            slice(s.start >> level, s.stop >> level) for s in (self.inner if inner else self.outer)
-        )
-        return rows, columns
-
-    def inside(self, level: int) -> tuple[slice, slice]:
-        """The inner window within the outer one, among latents of a level."""
-        rows, columns = (
-            slice((i.start - o.start) >> level, (i.stop - o.start) >> level)
-            for i, o in zip(self.inner, self.outer, strict=True)
-        )
-        return rows, columns
-
-    def mask(self, level: int) -> Tensor:
-        """[1, 1, h, w] of a level: what may change, which is what is not settled before it.
-
-        Settled are windows above, and those to the left in the same rows.
-        """
-        rows, columns = self.at(level)
-        i, j = self.inside(level)
-        out = torch.zeros(
-            (1, 1, rows.stop - rows.start, columns.stop - columns.start), dtype=torch.bool
-        )
-        out[:, :, i, j.start :] = True
-        out[:, :, i.stop :] = True
-        return out
+        return tuple(best_shift(part) for part in samples)
 
 
 def _tensor(values: NDArray[np.floating]) -> Tensor:

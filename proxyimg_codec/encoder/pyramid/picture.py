@@ -1,4 +1,4 @@
-"""From a picture and planned layers to an `Picture` whose layers are views of shared planes."""
+"""From a picture and planned layers to a `Picture` whose layers are views of shared planes."""
 
 from __future__ import annotations
 

@@ -1,0 +1,230 @@
+"""The flags of pxi-edit that are edits: words of the command line become operations."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+from ..errors import UsageError
+from .common import key
+
+Values = dict[str, Any]
+"""An operation; or ``{"script": operations}`` or ``{"undo": count}``."""
+
+
+class Edit(NamedTuple):
+    """An edit of the command line: its flag, what reads its words, and the words."""
+
+    flag: str
+    parse: Callable[..., Values]
+    words: list[str]
+
+    def values(self) -> Values:
+        """What is to be done.
+
+        Raises:
+            UsageError: The words make no sense.
+        """
+        try:
+            return self.parse(*(w.strip() if w.startswith(" -") else w for w in self.words))
+        except (ValueError, TypeError):
+            said = f"{self.flag} {' '.join(self.words)}"
+            raise UsageError(f"{said}: cannot be understood; see --help") from None
+
+
+class Flag(NamedTuple):
+    """A flag.
+
+    Attributes:
+        name: As it is written.
+        parse: From its words to what is to be done; raises `ValueError` or `TypeError`.
+        words: How help calls them; a last one that ends in `` ...`` may be many or none.
+        help: A phrase.
+    """
+
+    name: str
+    parse: Callable[..., Values]
+    words: Sequence[str]
+    help: str
+
+    def add(self, edits: argparse._ArgumentGroup) -> None:
+        """Adds the flag to a command line whose `edits` gathers them, in their order."""
+        flag, parse = self.name, self.parse
+
+        class Gather(argparse.Action):
+            def __call__(self, parser: Any, space: Any, values: Any, option: Any = None) -> None:
+                space.edits = [*space.edits, Edit(flag, parse, list(values))]
+
+        edits.add_argument(
+            flag,
+            action=Gather,
+            nargs="+" if self.words[-1].endswith(" ...") else len(self.words),
+            default=argparse.SUPPRESS,
+            help=self.help,
+            metavar=tuple(word.removesuffix(" ...") for word in self.words),
+        )
+
+
+def add_edits(p: argparse.ArgumentParser) -> None:
+    """Adds all flags; `edits` of what is parsed has a list of `Edit`."""
+    p.set_defaults(edits=[])
+    group = p.add_argument_group("edits")
+    for flag in FLAGS:
+        flag.add(group)
+
+
+def _floats(text: str, count: int) -> list[float]:
+    values = [float(v) for v in text.split(",")]
+    if len(values) != count:
+        raise ValueError
+    return values
+
+
+def _pivoted(text: str) -> tuple[str, Values]:
+    """What stands before @X,Y, and the pivot if there is one."""
+    value, at, place = text.partition("@")
+    return value, {"pivot": _floats(place, 2)} if at else {}
+
+
+def _geometry(op: str, **parameter: int) -> Callable[[str, str], Values]:
+    ((name, count),) = parameter.items()
+
+    def parse(layer: str, value: str) -> Values:
+        value, pivot = _pivoted(value)
+        numbers = _floats(value, count)
+        return {"op": op, "layer": key(layer), name: numbers if count > 1 else numbers[0], **pivot}
+
+    return parse
+
+
+def _scale(layer: str, value: str) -> Values:
+    value, pivot = _pivoted(value)
+    by = _floats(value, 2 if "," in value else 1)
+    return {"op": "scale", "layer": key(layer), "by": [by[0], by[-1]], **pivot}
+
+
+def _flip(layer: str, axis: str) -> Values:
+    return {"op": "flip", "layer": key(layer), "axis": axis}
+
+
+def _drag(layer: str, *handles: str) -> Values:
+    if not handles:
+        raise ValueError
+    moves = []
+    for handle in handles:
+        place, _, by = handle.strip().partition(":")
+        moves.append([*_floats(place, 2), *_floats(by, 2)])
+    return {"op": "drag", "layer": key(layer), "handles": moves}
+
+
+def _point(layer: str, which: str, by: str) -> Values:
+    path, point = (int(v) for v in which.split(","))
+    return {
+        "op": "point", "layer": key(layer), "path": path, "point": point, "by": _floats(by, 2)
+    }  # fmt: skip
+
+
+def _named(op: str) -> Callable[[str], Values]:
+    return lambda layer: {"op": op, "layer": key(layer)}
+
+
+def _assigned(op: str, name: str) -> Callable[[str], Values]:
+    def parse(text: str) -> Values:
+        layer, given, value = text.rpartition("=") if "=" in text else (text, "", "")
+        return {"op": op, "layer": key(layer), **({name: value} if given else {})}
+
+    return parse
+
+
+def _order(layer: str, place: str) -> Values:
+    return {"op": "order", "layer": key(layer), "to": key(place)}
+
+
+def _texture(text: str) -> Values:
+    layer, given, source = text.partition("=")
+    if not given or not source:
+        raise ValueError
+    values: Values = {"op": "texture", "layer": key(layer)}
+    if source.endswith("@shape"):
+        source, values["fit"] = source.removesuffix("@shape"), "shape"
+    if parts := re.fullmatch(r"(.+?\.pxi):(.+)", source, re.IGNORECASE):
+        return {**values, "source": parts[1], "from_layer": key(parts[2])}
+    return {**values, "source": source}
+
+
+def _recolour(layer: str, changes: str) -> Values:
+    values: Values = {"op": "recolour", "layer": key(layer)}
+    for change in changes.split(","):
+        name, colon, value = change.partition(":")
+        if colon:
+            values[name] = float(value)
+        else:
+            values["tint"] = name
+    return values
+
+
+def _group(text: str) -> Values:
+    name, given, layers = text.partition("=")
+    if not given:
+        raise ValueError
+    return {"op": "group", "layers": [key(v) for v in layers.split(",")], "name": name}
+
+
+def _ungroup(name: str) -> Values:
+    return {"op": "ungroup", "name": name}
+
+
+def _outlines(file: str) -> Values:
+    return {"op": "outlines", "source": file}
+
+
+def _script(file: str) -> Values:
+    from ..edit.script import parse
+    from ..io.files import read_bytes
+
+    try:
+        words = read_bytes(file).decode()
+    except UnicodeDecodeError:
+        raise UsageError(f"{file}: is not UTF-8 text") from None
+    return {"script": parse(words, file)}
+
+
+def _undo(count: str) -> Values:
+    return {"undo": int(count)}
+
+
+FLAGS = (
+    Flag("--move", _geometry("move", by=2), ["NAME", "DX,DY"], "move by canvas pixels"),
+    Flag("--rotate", _geometry("rotate", degrees=1), ["NAME", "DEG[@X,Y]"],
+        "turn clockwise, about the centre or X,Y"),
+    Flag("--scale", _scale, ["NAME", "F[,FY][@X,Y]"], "enlarge F times, or F across and FY down"),
+    Flag("--shear", _geometry("shear", by=2), ["NAME", "KX,KY[@X,Y]"], "slant"),
+    Flag("--affine", _geometry("affine", matrix=6), ["NAME", "A,B,C,D,E,F[@X,Y]"],
+        "x' = A x + C y + E, y' = B x + D y + F"),
+    Flag("--flip", _flip, ["NAME", "AXIS"], "mirror: horizontal or vertical"),
+    Flag("--drag", _drag, ["NAME", "X,Y:DX,DY ..."],
+        "bend: points of the layer and where they go; 0,0 pins a point"),
+    Flag("--point", _point, ["NAME", "PATH,POINT", "DX,DY"], "move a boundary's control point"),
+    Flag("--outlines", _outlines, ["FILE.svg"], "take boundaries from an SVG, by layer name"),
+    Flag("--remove", _named("remove"), ["NAME"], "take away: what it hid shows"),
+    Flag("--duplicate", _assigned("duplicate", "name"), ["NAME[=COPY]"], "copy"),
+    Flag("--rename", _assigned("rename", "name"), ["NAME=NEW"], "give another name"),
+    Flag("--order", _order, ["NAME", "PLACE"],
+        "front, back, forward, backward, or a position from the back"),
+    Flag("--hide", _named("hide"), ["NAME"], "stop drawing"),
+    Flag("--show", _named("show"), ["NAME"], "draw again"),
+    Flag("--still", _named("still"), ["NAME"], "forget the motion"),
+    Flag("--opacity", _geometry("opacity", value=1), ["NAME", "0-1"], "set the opacity"),
+    Flag("--texture", _texture, ["NAME=SOURCE"],
+        "texture of another layer, of a .pxi file (FILE.pxi:LAYER) or of a picture; with @shape by "
+        "outlines instead of boxes"),
+    Flag("--recolour", _recolour, ["NAME", "CHANGE"],
+        "hue:DEG, saturation:F, brightness:F, #rrggbb (shades of a colour); several with commas"),
+    Flag("--group", _group, ["NAME=A,B,..."], "put layers into a group"),
+    Flag("--ungroup", _ungroup, ["NAME"], "dissolve a group"),
+    Flag("--parent", _assigned("parent", "to"), ["NAME=PARENT"], "let a layer follow another one"),
+    Flag("--script", _script, ["FILE"], "edits from a JSON file"),
+    Flag("--undo", _undo, ["N"], "take back the last N edits"),
+)  # fmt: skip

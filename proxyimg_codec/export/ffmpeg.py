@@ -1,0 +1,79 @@
+"""FFmpeg through PyAV: frames, and chains of its filters."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import UnsupportedError
+
+if TYPE_CHECKING:
+    from av import VideoFrame
+    from av.filter import Graph
+
+Frame = NDArray[np.uint8]
+"""Pixels [H, W, 3 or 4], straight alpha."""
+
+
+def import_av() -> Any:
+    """PyAV.
+
+    Raises:
+        UnsupportedError: It is not installed.
+    """
+    try:
+        import av
+    except ImportError:
+        raise UnsupportedError(
+            "video and animated pictures need PyAV: pip install 'proxyimg-codec[animate]'"
+        ) from None
+    return av
+
+
+def write_errors() -> tuple[type[Exception], ...]:
+    """What raises where a clip cannot be written."""
+    with contextlib.suppress(UnsupportedError):
+        return (OSError, import_av().FFmpegError)
+    return (OSError,)
+
+
+def layout_of(frame: Frame) -> str:
+    """FFmpeg's name for the layout of its pixels."""
+    return "rgba" if frame.shape[2] == 4 else "rgb24"
+
+
+def video_frame(frame: Frame, number: int) -> VideoFrame:
+    """FFmpeg's view of a frame [H, W, 3 or 4]."""
+    picture: VideoFrame = import_av().VideoFrame.from_ndarray(frame, layout_of(frame))
+    picture.pts = number
+    return picture
+
+
+def graph(steps: list[tuple[str, str]], inputs: list[tuple[int, int, str]]) -> Graph:
+    """A chain of FFmpeg's filters; the first has inputs of these widths, heights and layouts."""
+    av = import_av()
+    chain: Graph = av.filter.Graph()
+    chain.threads = 1
+    nodes = [chain.add(*step) for step in steps] + [chain.add("buffersink")]
+    for k, (width, height, layout) in enumerate(inputs):
+        form = av.VideoFormat(layout)
+        source = chain.add_buffer(
+            width=width, height=height, format=form, name=f"in{k}", time_base=Fraction(1)
+        )
+        source.link_to(nodes[0], 0, k)
+    chain.link_nodes(*nodes)
+    chain.configure(auto_buffer=False)
+    return chain
+
+
+def pulled(chain: Graph) -> Iterator[VideoFrame]:
+    """What the chain has ready."""
+    av = import_av()
+    with contextlib.suppress(av.BlockingIOError, av.EOFError):
+        while True:
+            yield chain.vpull()
