@@ -1,9 +1,9 @@
-# `make demo` and `make test` set up .venv by themselves.
+# `make demo`, `make test` and `make docs` set up .venv by themselves.
 PYTHON ?= python3
 BIN := .venv/bin
 PHOTO := docs/images/photo.png
 
-.PHONY: demo test lint bench clean
+.PHONY: demo test docs bench clean
 
 .venv/ready: pyproject.toml constraints.txt setup.py $(wildcard proxyimg_codec/native/*.cpp proxyimg_codec/native/*.h)
 	$(PYTHON) -m venv .venv
@@ -29,8 +29,14 @@ test: .venv/ready tests/web/node_modules/ready
 	$(BIN)/lint-imports --no-cache --no-logo
 	$(BIN)/pytest
 
+# The documentation in site/, without a network. Warnings and links that lead nowhere are errors, unless
+# --quiet hides them.
+docs: .venv/ready
+	PATH="$(CURDIR)/$(BIN):$$PATH" NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+	@echo "Open site/index.html."
+
 bench: .venv/ready
 	$(BIN)/python -m benchmarks.figures $(DATA)
 
 clean:
-	rm -rf .venv tests/web/node_modules demo build *.egg-info proxyimg_codec/native/_kernel*.so
+	rm -rf .venv tests/web/node_modules demo site build *.egg-info proxyimg_codec/native/_kernel*.so

@@ -1,1 +1,1 @@
-"""Slow measurements; see the README for how to run them."""
+"""Slow measurements; docs/figures.md has what they printed, and the commands."""

@@ -1,4 +1,4 @@
-"""The figures of the README: fitting, quantization, layers, speed and memory.
+"""Figures of the implicit coder: fitting, quantization, layers, speed and memory.
 
     python -m benchmarks.figures DATA [--only float quantized layers encode decode] [--quick]
 

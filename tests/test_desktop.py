@@ -185,7 +185,7 @@ def test_pip_installs_all_files():
 
 @needs("file", "update-mime-database", "gio")
 def test_recipe_of_the_guide(tmp_path):
-    (recipe,) = re.findall(r"```bash\n(.*?)```", (ROOT / "docs/guide.md").read_text(), re.S)
+    (recipe,) = re.findall(r"```bash\n(.*?)```", (ROOT / "docs/guide/desktop.md").read_text(), re.S)
     home = tmp_path / "home"
     home.mkdir()
     env = {"HOME": str(home), "XDG_DATA_HOME": str(home / ".local/share")}

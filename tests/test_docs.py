@@ -1,4 +1,4 @@
-"""Every command and Python block of the README and the guide is run."""
+"""Every command and Python block of the README and the guide is run; links lead somewhere."""
 
 import json
 import re
@@ -6,7 +6,9 @@ import shlex
 import shutil
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
+from pkgutil import resolve_name
 
 import numpy as np
 import pytest
@@ -15,11 +17,21 @@ from proxyimg_codec.io import raster
 from tests.conftest import disc, smooth
 
 ROOT = Path(__file__).parents[1]
-PAGES = ["README.md", "docs/guide.md"]
+GUIDE = ROOT / "docs/guide"
+CHAPTERS = re.findall(r"^\d+\. \[.*?\]\((.*?)\)", (GUIDE / "README.md").read_text("utf-8"), re.M)
+PAGES = ["README.md", *(f"docs/guide/{name}" for name in CHAPTERS)]
+"""In the order of the guide's index: commands use files that those of earlier pages made."""
+
+LINKED = ["CHANGELOG.md", "CONTRIBUTING.md", "README.md", "SECURITY.md"]
+LINKED += [p.relative_to(ROOT).as_posix() for p in sorted(ROOT.glob("docs/**/*.md"))]
 
 
 def blocks(page, language):
-    return re.findall(rf"```{language}\n(.*?)```", (ROOT / page).read_text(), re.S)
+    return re.findall(rf"```{language}\n(.*?)```", (ROOT / page).read_text("utf-8"), re.S)
+
+
+def with_blocks(language):
+    return [page for page in PAGES if blocks(page, language)]
 
 
 def commands(page):
@@ -47,13 +59,17 @@ def folder(tmp_path_factory):
     raster.write(path / "bear.png", clear)
     raster.write(path / "parrots.png", smooth(96, 64))
     raster.write(path / "parrots-labels.png", np.repeat(labels[..., None], 3, 2))
-    (path / "breathe.json").write_text(blocks("docs/guide.md", "json")[0])
+    (path / "breathe.json").write_text(blocks("docs/guide/animation.md", "json")[0])
     edits = [{"op": "move", "layer": "cat", "by": [3, 4]}]
     (path / "edits.json").write_text(json.dumps({"version": 1, "edits": edits}))
     return path
 
 
-@pytest.mark.parametrize("page", PAGES)
+def test_guide_lists_its_pages():
+    assert sorted(CHAPTERS) == sorted(p.name for p in GUIDE.glob("*.md") if p.stem != "README")
+
+
+@pytest.mark.parametrize("page", with_blocks("sh"))
 def test_commands_run(page, folder):
     assert commands(page)
     if not (folder / "photo.pxi").exists():
@@ -72,11 +88,10 @@ def run(words, folder):
     assert done.returncode == 0, (words, done.stderr)
 
 
-@pytest.mark.parametrize("page", PAGES)
+@pytest.mark.parametrize("page", with_blocks("python"))
 def test_python_blocks_run(page, folder):
     if not (folder / "photo.pxi").exists():
         run([*tool("pxi-encode"), "photo.png", "--preset", "fast"], folder)
-    assert blocks(page, "python")
     for block in blocks(page, "python"):
         env = {"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin"}
         done = subprocess.run(
@@ -86,12 +101,40 @@ def test_python_blocks_run(page, folder):
         assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize("page", [*PAGES, *map(str, Path(ROOT, "docs/decisions").glob("*.md"))])
+@pytest.mark.parametrize("page", LINKED)
 def test_links_lead_somewhere(page):
-    text = (ROOT / page).read_text()
+    text = (ROOT / page).read_text("utf-8")
     for link in re.findall(r"\]\(([^)#]+)\)", text):
         if not link.startswith("http"):
             assert ((ROOT / page).parent / link).exists(), link
+
+
+@pytest.mark.parametrize(
+    "page", sorted((ROOT / "docs/reference").glob("*.md")), ids=lambda p: p.stem
+)
+def test_reference_names_what_there_is(page):
+    # The site leaves out members that it does not find, without a warning.
+    pytest.importorskip("cv2")
+    entry = r"^::: (\S+)(?:\n {4}options:(?:\n {6}(?!members).*)*(?:\n {6}members: \[(.*?)\])?)?"
+    for name, members in re.findall(entry, page.read_text("utf-8"), re.M):
+        found = resolve_name(name)
+        for member in filter(None, members.split(", ")):
+            assert hasattr(found, member), f"{name}.{member}"
+
+
+def test_records_are_in_the_index():
+    folder = ROOT / "docs/decisions"
+    linked = re.findall(r"^\| \[.*?\]\((.*?)\)", (folder / "README.md").read_text("utf-8"), re.M)
+    assert linked == sorted(p.name for p in folder.glob("[0-9]*.md"))
+
+
+def test_glossary_names_modules():
+    rows = (ROOT / "docs/glossary.md").read_text("utf-8").splitlines()
+    places = [row.split("|")[-2] for row in rows if row.startswith("| ")]
+    named = {name for place in places for name in re.findall(r"`([\w.]+)`", place)}
+    assert "geometry.pose" in named
+    for name in named:
+        assert find_spec(f"proxyimg_codec.{name}"), name
 
 
 @pytest.mark.skipif(shutil.which("git") is None, reason="git is not installed")
@@ -102,6 +145,6 @@ def test_no_machine_paths():
     for name in files:
         if name.startswith(("tests/", ".ci/")) or not name.endswith((".py", ".md", ".cpp", ".h")):
             continue
-        assert not re.search(r"(^|\W)/(work|home|root)/|\.\./shared", (ROOT / name).read_text()), (
-            name
-        )
+        assert not re.search(
+            r"(^|\W)/(work|home|root)/|\.\./shared", (ROOT / name).read_text("utf-8")
+        ), name

@@ -128,7 +128,7 @@ def test_names_cannot_write_to_the_terminal(tool, launch, tmp_path):
 
 
 def test_codes_are_documented(tool):
-    guide = (ROOT / "docs/guide.md").read_text("utf-8")
+    guide = (ROOT / "docs/guide/checking.md").read_text("utf-8")
     said = tool("validate", "--help").out.decode()
     for code, meaning in CODES.items():
         assert f"{code} " in said
