@@ -11,7 +11,7 @@ import numpy as np
 from proxyimg_codec.codec import read
 from proxyimg_codec.container import check, chunks, file, undo
 from proxyimg_codec.container.content import Container
-from proxyimg_codec.geometry import mesh, pose, raster, warp
+from proxyimg_codec.geometry import connectivity, mesh, pose, raster, warp
 from proxyimg_codec.geometry.boundary import Boundary
 from proxyimg_codec.geometry.pose import REST, Pose
 from proxyimg_codec.model import Layers, Picture
@@ -66,7 +66,7 @@ def _centre_first(base: mesh.Base, splits: Sequence[Any]) -> mesh.Refined:
     return refine_of(base, [*splits[:1], *later])
 
 
-def _by_number(self: Any, edge: mesh.Edge, near: int) -> Any:
+def _by_number(self: Any, edge: connectivity.Edge, near: int) -> Any:
     return np.sort(ranked_of(self, edge, near))
 
 
@@ -146,7 +146,7 @@ def _values_of_neighbours(residuals: Any, *_: Any) -> Any:
 
 
 outline_of, locate_of, rasterize_of = warp.outline, warp.Warp.locate, raster.rasterize
-pose_of, refine_of, ranked_of = pose.decode, mesh.refine, mesh._Border.ranked
+pose_of, refine_of, ranked_of = pose.decode, mesh.refine, connectivity.Border.ranked
 premultiplied_of, posed_of = compose.premultiplied, compose._Painter.posed
 parse_of, from_bytes_of, selected_of = file.parse_within, read.from_bytes, pixels.selected
 
@@ -165,7 +165,7 @@ FAULTS: dict[str, list[Patch]] = {
     "maps-unclamped": [(pose, "POINT_MAX", 1 << 40)],
     "no-closing": [(mesh, "_close", lambda triangles, origin, *_: (triangles, origin))],
     "children-turned": [(mesh, "refine", _centre_first)],
-    "ranks-by-number": [(mesh._Border, "ranked", _by_number)],
+    "ranks-by-number": [(connectivity.Border, "ranked", _by_number)],
     "midpoints-not-predicted": [(pose, "restored", _values_of_neighbours)],
     "last-face-wins": [(warp, "rasterize", _last_face)],
     "turned-faces-win": [(warp, "rasterize", _both_sides)],

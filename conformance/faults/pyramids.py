@@ -12,7 +12,14 @@ from proxyimg_codec.entropy import laplace
 from proxyimg_codec.geometry.pose import Pose
 from proxyimg_codec.native import kernel
 from proxyimg_codec.render import compose
-from proxyimg_codec.texture import context, occlusion, planes, pyramid, registered_model, synthesis
+from proxyimg_codec.texture import (
+    context,
+    latents,
+    occlusion,
+    pyramid,
+    registered_model,
+    synthesis,
+)
 from proxyimg_codec.texture.context import LevelCoder
 from proxyimg_codec.texture.occlusion import ALL_IN_PLACE, ALL_REMOVED, Moved, Occlusion
 from proxyimg_codec.texture.pyramid import PyramidTexture
@@ -149,8 +156,8 @@ def _only_where(self: Pose, other: Pose) -> bool:
     return (self.matrix, self.shift) == (other.matrix, other.shift)
 
 
-support_of, shifted_of, level_of = planes.support_at, context._shifted, LevelCoder.__init__
-wave_of, escape_of = LevelCoder._wave, planes._Decoder._escape
+support_of, shifted_of, level_of = latents.support_at, context._shifted, LevelCoder.__init__
+wave_of, escape_of = LevelCoder._wave, latents.Decoder._escape
 position_of, samples_of = pyramid._position, PyramidTexture._samples
 unpack_of, premultiplied_of = pyramid.unpack, compose.premultiplied
 moved_of = Occlusion.moved
@@ -162,7 +169,7 @@ _FAULTS: dict[str, list[Patch]] = {
     "features-truncated": [(context, "_squashed", _truncated)],
     "chroma-first": [(LevelCoder, "_wave", _chroma_first)],
     "waves-too-steep": [(context, "waves", _waves(4))],
-    "ignores-support": [(planes, "support_at", _everywhere)],
+    "ignores-support": [(latents, "support_at", _everywhere)],
     "context-not-mirrored": [(context, "_shifted", _clipped)],
     "context-high-mirrored-as-low": [(context, "_shifted", _low_everywhere)],
     "synthesis-not-mirrored": [(synthesis, "mirrored_indices", lambda n, high:
@@ -172,8 +179,8 @@ _FAULTS: dict[str, list[Patch]] = {
     "one-level-set": [(registered_model, "LEVEL_SETS", 1)],
     "ignores-step": [(synthesis, "STEP_ORIGIN", 0)],
     "codes-certain-latents": [(laplace, "CERTAIN", -1)],
-    "escapes-unsigned": [(planes._Decoder, "_escape", _unsigned)],
-    "accepts-left-over-escapes": [(planes._Decoder, "finish", lambda self, where: None)],
+    "escapes-unsigned": [(latents.Decoder, "_escape", _unsigned)],
+    "accepts-left-over-escapes": [(latents.Decoder, "finish", lambda self, where: None)],
     "accepts-large-latents": [(context, "LIMIT", 1 << 20)],
     "nearest-sample": [(pyramid, "_position", _nearest)],
     "linear": [(pyramid, "_weights", _linear)],

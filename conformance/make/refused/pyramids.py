@@ -11,7 +11,7 @@ from proxyimg_codec.container.chunks import Chunk, write
 from proxyimg_codec.entropy import arrays
 from proxyimg_codec.model import Picture
 from proxyimg_codec.texture import planes
-from proxyimg_codec.texture.planes import Latents
+from proxyimg_codec.texture.latents import Latents
 
 from ..builders import SIZE, Numbers, changed, ellipse, layer, picture
 from ..valid.pyramids import coded, view

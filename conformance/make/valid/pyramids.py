@@ -21,8 +21,9 @@ from proxyimg_codec.entropy import rans
 from proxyimg_codec.model import Picture
 from proxyimg_codec.texture import planes
 from proxyimg_codec.texture.implicit import Box
+from proxyimg_codec.texture.latents import Latents
 from proxyimg_codec.texture.occlusion import Occlusion
-from proxyimg_codec.texture.planes import Latents, Planes
+from proxyimg_codec.texture.planes import Planes
 from proxyimg_codec.texture.pyramid import PyramidTexture
 
 from ..builders import (
