@@ -96,6 +96,13 @@ class Image(PictureHandle):
 
         Raises:
             UsageError: An operation is unknown, or cannot be applied.
+
+        Example:
+            >>> import proxyimg_codec as pxi
+            >>> image = pxi.open("photo.pxi")
+            >>> moved = image.edited({"op": "move", "layer": "disc", "by": [6, -2]})
+            >>> len(moved.history)
+            1
         """
         from .edit.script import apply
 
@@ -106,6 +113,12 @@ class Image(PictureHandle):
 
         Raises:
             UsageError: The history has fewer edits than that.
+
+        Example:
+            >>> import proxyimg_codec as pxi
+            >>> image = pxi.open("photo.pxi")
+            >>> image.layers["disc"].hidden().undone() == image
+            True
         """
         from .edit.history import undone
 
@@ -141,6 +154,14 @@ class Image(PictureHandle):
 
         Raises:
             UsageError: The motion does not fit the picture.
+
+        Example:
+            >>> import proxyimg_codec as pxi
+            >>> from proxyimg_codec.animate.animate import preset
+            >>> image = pxi.open("photo.pxi")
+            >>> moving = image.animated(preset(image, "sway", duration=1))
+            >>> moving.timeline.seconds
+            1.0
         """
         from .animate.animate import animate
 
@@ -186,6 +207,14 @@ class Image(PictureHandle):
             UnsupportedError: The engine is not installed.
             LimitError: The output is too large, or takes too much work.
             FormatError: A coded stream that is decoded only now is corrupt.
+
+        Example:
+            >>> import proxyimg_codec as pxi
+            >>> image = pxi.open("photo.pxi")
+            >>> image.render(width=32).shape
+            (24, 32, 3)
+            >>> image.render(region=(20, 10, 16, 12), scale=4, dtype="float32").shape
+            (48, 64, 3)
         """
         return pixels.render(
             self._picture, t=t, width=width, height=height, scale=scale, region=region,
@@ -207,6 +236,13 @@ class Image(PictureHandle):
         Raises:
             InputError: The file cannot be written.
             LimitError: The file would exceed what readers accept by default.
+
+        Example:
+            >>> import proxyimg_codec as pxi
+            >>> image = pxi.open("photo.pxi")
+            >>> image.layers["disc"].removed().save("without.pxi")
+            >>> [layer.name for layer in pxi.open("without.pxi").layers]
+            ['back', 'bar']
         """
         write_atomically(path, self.to_bytes())
 
@@ -262,6 +298,13 @@ def from_bytes(data: bytes, limits: Limits = DEFAULT_LIMITS, *, tolerant: bool =
         FormatError: The file breaks the format; or, if `tolerant`, too little of it is left.
         UnsupportedError: The file needs a newer reader.
         LimitError: The file exceeds `limits`.
+
+    Example:
+        >>> import proxyimg_codec as pxi
+        >>> with open("photo.pxi", "rb") as file:
+        ...     image = pxi.from_bytes(file.read())
+        >>> image.width, image.height
+        (64, 48)
     """
     return Image(read.from_bytes(data, limits, tolerant=tolerant))
 
@@ -279,6 +322,12 @@ def open_image(
     Raises:
         InputError: The file cannot be read.
         FormatError, UnsupportedError, LimitError: As `from_bytes`.
+
+    Example:
+        >>> import proxyimg_codec as pxi
+        >>> image = pxi.open("photo.pxi")
+        >>> [layer.name for layer in image.layers]
+        ['back', 'bar', 'disc']
     """
     return Image(read.from_file(path, limits, tolerant=tolerant))
 
@@ -311,6 +360,15 @@ def encode(
         UsageError: A setting is out of range.
         UnsupportedError: A package that is needed is not installed.
         LimitError: The picture is larger than readers accept by default.
+
+    Example:
+        >>> import numpy as np
+        >>> import proxyimg_codec as pxi
+        >>> pixels = np.full((48, 64, 3), 200, np.uint8)
+        >>> pixels[:, 32:] = 60
+        >>> image = pxi.encode(pixels, quality=40, effort=1, max_layers=1)
+        >>> image.render().shape
+        (48, 64, 3)
     """
     try:
         from .encoder import encode as encoder
