@@ -1,5 +1,5 @@
 // Entropy coding of the pyramid's latents: entropy/laplace.py, entropy/rans.py and the coders of
-// texture/planes.py, statement by statement; numpy is their judge.
+// texture/latents.py, statement by statement; numpy is their judge.
 #pragma once
 
 #include <algorithm>
