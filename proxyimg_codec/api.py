@@ -97,7 +97,7 @@ class Image(PictureHandle):
         Raises:
             UsageError: An operation is unknown, or cannot be applied.
 
-        Example:
+        Examples:
             >>> import proxyimg_codec as pxi
             >>> image = pxi.open("photo.pxi")
             >>> moved = image.edited({"op": "move", "layer": "disc", "by": [6, -2]})
@@ -114,7 +114,7 @@ class Image(PictureHandle):
         Raises:
             UsageError: The history has fewer edits than that.
 
-        Example:
+        Examples:
             >>> import proxyimg_codec as pxi
             >>> image = pxi.open("photo.pxi")
             >>> image.layers["disc"].hidden().undone() == image
@@ -155,7 +155,7 @@ class Image(PictureHandle):
         Raises:
             UsageError: The motion does not fit the picture.
 
-        Example:
+        Examples:
             >>> import proxyimg_codec as pxi
             >>> from proxyimg_codec.animate.animate import preset
             >>> image = pxi.open("photo.pxi")
@@ -208,7 +208,7 @@ class Image(PictureHandle):
             LimitError: The output is too large, or takes too much work.
             FormatError: A coded stream that is decoded only now is corrupt.
 
-        Example:
+        Examples:
             >>> import proxyimg_codec as pxi
             >>> image = pxi.open("photo.pxi")
             >>> image.render(width=32).shape
@@ -237,7 +237,7 @@ class Image(PictureHandle):
             InputError: The file cannot be written.
             LimitError: The file would exceed what readers accept by default.
 
-        Example:
+        Examples:
             >>> import proxyimg_codec as pxi
             >>> image = pxi.open("photo.pxi")
             >>> image.layers["disc"].removed().save("without.pxi")
@@ -299,7 +299,7 @@ def from_bytes(data: bytes, limits: Limits = DEFAULT_LIMITS, *, tolerant: bool =
         UnsupportedError: The file needs a newer reader.
         LimitError: The file exceeds `limits`.
 
-    Example:
+    Examples:
         >>> import proxyimg_codec as pxi
         >>> with open("photo.pxi", "rb") as file:
         ...     image = pxi.from_bytes(file.read())
@@ -323,7 +323,7 @@ def open_image(
         InputError: The file cannot be read.
         FormatError, UnsupportedError, LimitError: As `from_bytes`.
 
-    Example:
+    Examples:
         >>> import proxyimg_codec as pxi
         >>> image = pxi.open("photo.pxi")
         >>> [layer.name for layer in image.layers]
@@ -361,7 +361,7 @@ def encode(
         UnsupportedError: A package that is needed is not installed.
         LimitError: The picture is larger than readers accept by default.
 
-    Example:
+    Examples:
         >>> import numpy as np
         >>> import proxyimg_codec as pxi
         >>> pixels = np.full((48, 64, 3), 200, np.uint8)
