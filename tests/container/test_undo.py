@@ -11,7 +11,7 @@ from proxyimg_codec.container.chunks import Chunk, read, write
 from proxyimg_codec.container.fields import pack, unpack
 from proxyimg_codec.container.undo import Step
 from proxyimg_codec.errors import FormatError, LimitError
-from proxyimg_codec.limits import DEFAULT_LIMITS, Limits
+from proxyimg_codec.limits import DEFAULT_LIMITS, Budget, Limits
 
 PRESENT = [Chunk("HEAD", b"h"), Chunk("LAYR", b"a"), Chunk("LAYR", b"a"), Chunk("TEXR", b"t" * 99)]
 TAIL = Chunk("TAIL", b"")
@@ -21,7 +21,7 @@ steps = st.builds(Step, st.text(max_size=9), st.lists(chunks, max_size=6).map(tu
 
 
 def decode(chunk, present=PRESENT, limits=DEFAULT_LIMITS):
-    return undo.decode(chunk, present, "chunk uNDO", limits)
+    return undo.decode(chunk, present, "chunk uNDO", Budget(limits))
 
 
 @given(st.lists(chunks, min_size=1, max_size=6), st.lists(steps, min_size=1, max_size=4))

@@ -119,7 +119,7 @@ def ring():
         builders.ellipse((4000.3, 3990.7), (6.2, 5.9)),
         builders.ellipse((4000.4, 3990.1), (3.1, 2.3), reverse=True),
     ]
-    return builders.picture(
+    ring = builders.picture(
         (side, side),
         [
             builders.layer("back", (0, 0, side, side), black),
@@ -128,6 +128,7 @@ def ring():
         solid(0.0),
         solid(1.0),
     )
+    return pxi.Image(ring)
 
 
 @pytest.mark.parametrize("width", [31 * 14, 14, 5])
@@ -152,7 +153,7 @@ def test_positions_halfway_between_two_are_rounded_up():
         builders.layer("back", (0, 0, side, side), black),
         builders.layer("stairs", (0, 0, side, side), white, path, unit=10),
     ]
-    image = builders.picture((side, side), layers, solid(0.0), solid(1.0))
+    image = pxi.Image(builders.picture((side, side), layers, solid(0.0), solid(1.0)))
     view, expected = make_view((side, side), width=w), image.render(width=w, dtype=np.float32)
     run, inputs = session(build(image)), samples(view)
     grid = inputs["points"].reshape(w, w, 2)

@@ -9,6 +9,7 @@ import pytest
 import proxyimg_codec as pxi
 from proxyimg_codec.errors import UnsupportedError
 from proxyimg_codec.export.onnx_synthesis import build, feed
+from proxyimg_codec.model import Layers
 from proxyimg_codec.texture.planes import Latents, Planes, encoded
 from tests.pyramids import implicit, picture
 from tests.support.images import changed
@@ -151,7 +152,7 @@ def test_layers_of_several_planes(tool, tmp_path):
     stack = [*image.layers][:2] + [
         changed(v, texture=replace(v.texture, planes=other)) for v in image.layers[2:]
     ]
-    changed(image, layers=pxi.image.Layers(stack)).save(tmp_path / "a.pxi")
+    changed(image, layers=Layers(stack)).save(tmp_path / "a.pxi")
     path = tmp_path / "a.onnx"
     export = "decode", tmp_path / "a.pxi", "--export-onnx", path
     assert "choose one layer with --layer" in tool(*export, code=2).err

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from proxyimg_codec.errors import FormatError, LimitError
 from proxyimg_codec.geometry import mesh
 from proxyimg_codec.geometry.mesh import Base, Mesh
-from proxyimg_codec.limits import Limits
+from proxyimg_codec.limits import Budget, Limits
 
 
 def lattice(columns, rows, keep=None, step=(412, 400)):
@@ -162,7 +162,7 @@ def test_refinement_is_bounded():
     plain = Mesh.build(lattice(4, 4))
     fine = plain.split([np.ones(18, bool), np.ones(72, bool)])
     with pytest.raises(LimitError, match="faces"):
-        _ = Mesh(fine.fields, limits=Limits(faces=100)).refined
+        _ = Mesh(fine.fields, budget=Budget(Limits(faces=100))).refined
 
 
 def test_numbers_of_symbols_do_not_meet():

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from proxyimg_codec.errors import LimitError
 from proxyimg_codec.geometry.raster import rasterize
-from proxyimg_codec.limits import Limits
+from proxyimg_codec.limits import Budget, Limits
 
 
 def fan(rng, points=7, size=20.0):
@@ -74,4 +74,4 @@ def test_flat_triangles_hold_nothing():
 def test_folding_without_end_is_refused():
     big = np.repeat(np.array([[(0, 0), (99, 0), (0, 99)]], float), 50, axis=0)
     with pytest.raises(LimitError, match="overlap"):
-        rasterize(big, 0, 0, 30, 30, Limits(overlap=10))
+        rasterize(big, 0, 0, 30, 30, Budget(Limits(overlap=10)))
