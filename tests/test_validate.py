@@ -336,7 +336,7 @@ def test_folded_meshes():
     flipped = -2 * (nodes - nodes.mean(0).astype(int))[:, 0] >> 6
     swapped = zero.nodes if zero.nodes is not None else 0 * nodes
     swapped[:, 0] = flipped
-    layers = [changed(v, pose=replace(zero, nodes=swapped if v is disc else None, sway=None))
+    layers = [changed(v, pose=replace(zero, nodes=swapped if v == disc else None, sway=None))
               for v in image.layers]  # fmt: skip
     folded = changed(image, layers=Layers(layers))
     assert odd(folded) == ["VAL-9"]
