@@ -6,7 +6,6 @@ import pickle
 import tracemalloc
 import weakref
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,10 +14,9 @@ import proxyimg_codec as pxi
 from conformance.builders import Numbers, disc, on_back
 from proxyimg_codec import model
 from proxyimg_codec.container.chunks import Chunk, read
-from tests import moving, pyramids
+from tests.support import moving, pyramids
 from tests.support.images import changed
-
-ROOT = Path(__file__).parents[1]
+from tests.support.paths import ROOT
 
 
 def edited_image():

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from proxyimg_codec.io import raster
-from tests.conftest import disc, smooth
+from tests.support.paths import ROOT
+from tests.support.pictures import disc, smooth
 
-ROOT = Path(__file__).parents[1]
 PAGES = ["README.md", "docs/guide.md"]
 
 
@@ -31,7 +31,6 @@ def commands(page):
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    pytest.importorskip("cv2")
     path = tmp_path_factory.mktemp("docs")
     raster.write(path / "photo.png", smooth(96, 64))
     (path / "masks").mkdir()

@@ -1,7 +1,6 @@
 """Limits are one budget for all parts of a file, and for all of a picture that is drawn."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import msgpack
 import numpy as np
@@ -19,10 +18,9 @@ from proxyimg_codec.geometry.warp import barycentric
 from proxyimg_codec.limits import DEFAULT_LIMITS, SMALL_FILE, Budget, Limits
 from proxyimg_codec.model import Layers
 from proxyimg_codec.validation.validate import validate
-from tests import moving
+from tests.support import moving
 from tests.support.images import changed
-
-ROOT = Path(__file__).parents[1]
+from tests.support.paths import ROOT
 
 
 @pytest.fixture(scope="module")

@@ -1,16 +1,12 @@
 import hashlib
 import importlib
 import re
-import sys
 from dataclasses import fields, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from conformance import pixels
 from conformance.cases import load
@@ -26,10 +22,10 @@ from proxyimg_codec.model import Layer, Layers
 from proxyimg_codec.texture import context, diffusion, planes, pyramid, registered_model
 from proxyimg_codec.texture.implicit import ImplicitTexture
 from proxyimg_codec.texture.network import NetShape, Network
-from tests.geometry.test_mesh import lattice
 from tests.support.images import image as image_of
+from tests.support.meshes import lattice
+from tests.support.paths import ROOT
 
-ROOT = Path(__file__).parents[1]
 SPEC = ROOT / "spec"
 NUMBERED = sorted(SPEC.glob("[0-9]*.md"), key=lambda p: int(p.name.partition("-")[0]))
 CHAPTERS = {p.name: p.read_text("utf-8") for p in (SPEC / "README.md", *NUMBERED)}

@@ -3,17 +3,16 @@
 import json
 import os
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
 from proxyimg_codec.cli.validate import RESULTS
 from proxyimg_codec.container.chunks import Chunk, read, write
 from proxyimg_codec.validation.warnings import CODES
-from tests import pyramids
+from tests.support import pyramids
 from tests.support.images import changed
+from tests.support.paths import ROOT
 
-ROOT = Path(__file__).parents[2]
 CASES = ROOT / "conformance" / "cases"
 
 

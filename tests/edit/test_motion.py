@@ -1,14 +1,10 @@
 """Every edit of a picture that moves."""
 
 import json
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import proxyimg_codec as pxi
 from conformance.builders import Numbers, texture
@@ -17,8 +13,8 @@ from conformance.moving import track as random_track
 from proxyimg_codec.errors import UsageError
 from proxyimg_codec.geometry.mesher import derived
 from proxyimg_codec.model import Layers
-from tests import moving
-from tests.edit.test_operations import EDITS
+from tests.support import moving
+from tests.support.edits import EDITS
 from tests.support.images import changed
 
 T = 0.4

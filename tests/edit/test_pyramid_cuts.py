@@ -17,10 +17,9 @@ from proxyimg_codec.model import Layers
 from proxyimg_codec.render.compose import outline
 from proxyimg_codec.render.view import make_view
 from proxyimg_codec.texture.occlusion import ALL_IN_PLACE, ALL_REMOVED, Moved, Occlusion
-from tests.edit.test_operations import EDITS, covered, grown
-from tests.pyramids import SIZE, cut_picture, implicit, planes, view
+from tests.support.edits import EDITS, covered, grown, near
 from tests.support.images import changed
-from tests.texture.test_occlusion import near
+from tests.support.pyramids import SIZE, cut_picture, implicit, planes, view
 
 
 @pytest.fixture

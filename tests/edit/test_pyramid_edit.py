@@ -10,9 +10,9 @@ import proxyimg_codec as pxi
 from proxyimg_codec.errors import UsageError
 from proxyimg_codec.model import Layers
 from proxyimg_codec.texture.pyramid import PyramidTexture
-from tests.edit.test_operations import EDITS, covered, grown
-from tests.pyramids import implicit, picture, planes, view
+from tests.support.edits import EDITS, covered, grown
 from tests.support.images import changed
+from tests.support.pyramids import implicit, picture, planes, view
 
 
 def saved(image, path):

@@ -9,19 +9,6 @@ import numpy as np
 import pytest
 
 import proxyimg_codec as pxi
-from proxyimg_codec.export import openraster as export
-from proxyimg_codec.export.common import at_full_opacity
-from proxyimg_codec.io import xml
-from proxyimg_codec.io.psnr import psnr_8bit
-from proxyimg_codec.io.raster import encode_png
-from proxyimg_codec.limits import Limits
-from proxyimg_codec.render.quality import psnr
-from tests.conftest import smooth
-from tests.test_pictures import icc
-
-pytest.importorskip("cv2")
-pytest.importorskip("OpenImageIO")
-
 from proxyimg_codec.encoder.import_layers import composite, encode_layers
 from proxyimg_codec.encoder.openraster import (
     LayeredPicture,
@@ -30,6 +17,14 @@ from proxyimg_codec.encoder.openraster import (
     read_openraster,
 )
 from proxyimg_codec.encoder.settings import Settings
+from proxyimg_codec.export import openraster as export
+from proxyimg_codec.export.common import at_full_opacity
+from proxyimg_codec.io import xml
+from proxyimg_codec.io.psnr import psnr_8bit
+from proxyimg_codec.io.raster import encode_png
+from proxyimg_codec.limits import Limits
+from proxyimg_codec.render.quality import psnr
+from tests.support.pictures import icc, smooth
 
 W, H = 64, 48
 FAST = Settings(effort=1, jobs=1)
@@ -299,7 +294,7 @@ def encoded(picture, settings):
 
 
 def alone(image: pxi.Image, name: str, **view) -> np.ndarray:
-    return at_full_opacity(image).render(layers=[name], **view)
+    return pxi.Image(at_full_opacity(image.picture)).render(layers=[name], **view)
 
 
 def test_the_picture_is_that_of_the_layers(scene):

@@ -11,8 +11,8 @@ from proxyimg_codec.errors import UnsupportedError
 from proxyimg_codec.export.onnx_synthesis import build, feed
 from proxyimg_codec.model import Layers
 from proxyimg_codec.texture.planes import Latents, Planes, encoded
-from tests.pyramids import implicit, picture
 from tests.support.images import changed
+from tests.support.pyramids import implicit, picture
 
 SIZE = 64, 48
 

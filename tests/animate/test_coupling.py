@@ -10,8 +10,8 @@ from proxyimg_codec.animate.animate import preset
 from proxyimg_codec.animate.coupling import touching
 from proxyimg_codec.geometry.pose import REST
 from proxyimg_codec.geometry.warp import barycentric
-from tests.pyramids import cut_picture
 from tests.support.images import changed
+from tests.support.pyramids import cut_picture
 
 
 @pytest.fixture

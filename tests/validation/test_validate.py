@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -16,10 +15,10 @@ from proxyimg_codec.geometry import deltas
 from proxyimg_codec.limits import Limits
 from proxyimg_codec.model import Layers
 from proxyimg_codec.validation import validate, warnings
-from tests import moving, pyramids
+from tests.support import moving, pyramids
 from tests.support.images import changed
+from tests.support.paths import ROOT
 
-ROOT = Path(__file__).parents[1]
 CASES = load()
 CLASSES = {"invalid": FormatError, "unsupported": UnsupportedError, "limit": LimitError}
 RULE = r"[A-Z]{3}-\d+"
