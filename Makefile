@@ -1,14 +1,21 @@
-# `make demo`, `make test` and `make docs` set up .venv by themselves.
+# `make demo`, `make quick`, `make test` and `make docs` set up .venv by themselves.
 PYTHON ?= python3
 BIN := .venv/bin
 PHOTO := docs/images/photo.png
 
-.PHONY: demo test docs bench clean
+.PHONY: demo quick test docs bench clean
 
 .venv/ready: pyproject.toml constraints.txt setup.py $(wildcard proxyimg_codec/native/*.cpp proxyimg_codec/native/*.h)
 	$(PYTHON) -m venv .venv
 	$(BIN)/pip install --quiet -c constraints.txt setuptools
 	$(BIN)/pip install --quiet -c constraints.txt -e '.[dev]'
+	touch $@
+
+# Enough for `make quick`: what the decoder needs.
+.venv/light: pyproject.toml constraints.txt setup.py $(wildcard proxyimg_codec/native/*.cpp proxyimg_codec/native/*.h)
+	test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	$(BIN)/pip install --quiet -c constraints.txt setuptools
+	$(BIN)/pip install --quiet -c constraints.txt -e . pytest hypothesis
 	touch $@
 
 demo: .venv/ready
@@ -21,6 +28,12 @@ demo: .venv/ready
 # A browser and a runtime for the tests of web/; without npm or a network these are skipped.
 tests/web/node_modules/ready: tests/web/package.json
 	-@command -v npm > /dev/null && timeout 300 npm install --silent --no-audit --no-fund --prefix tests/web && touch $@
+
+# The format and its decoder, without encoding anything: less than a minute.
+QUICK := $(addprefix tests/,entropy container geometry texture codec io test_golden.py)
+
+quick: .venv/light
+	$(BIN)/pytest $(QUICK) -q -m "not encoder and not browser and not data and not slow"
 
 test: .venv/ready tests/web/node_modules/ready
 	$(BIN)/ruff check .

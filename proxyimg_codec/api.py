@@ -275,6 +275,10 @@ class Layer(LayerHandle, Editable[Image]):
     def __hash__(self) -> int:
         return hash((self.image, self.position))
 
+    def __reduce__(self) -> tuple[type[Layer], tuple[Image, int]]:
+        # `data` must stay the very layer that the picture has.
+        return Layer, (self.image, self.position)
+
     def _edited(self, op: str, **values: Any) -> Image:
         given = {k: v for k, v in values.items() if v is not None}
         return self.image.edited({"op": op, "layer": self.name, **given})

@@ -1,41 +1,73 @@
 """Pictures, files and a way to call the tools, shared by all tests."""
 
-import importlib
+import importlib.util
 import io
+import shutil
 import subprocess
 import sys
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-ROOT = Path(__file__).parents[1]
+from tests.support import files
+from tests.support.paths import DATA, ROOT, TESTS
+from tests.support.pictures import disc, smooth
+from tests.support.tools import Ran, one_line
+
+ENCODE = ("cv2", "OpenImageIO", "onnx", "torch", "tqdm")
+"""What the extra ``encode`` installs."""
+
+KINDS = {
+    "encoder": ("encoder", ENCODE),
+    "training": ("encoder", ENCODE),
+    "benchmarks": ("encoder", ENCODE),
+    "bench": ("encoder", (*ENCODE, "imagecodecs", "matplotlib", "PIL")),
+    "cli/test_encode_cli.py": ("encoder", ENCODE),
+    "test_docs.py": ("encoder", ENCODE),
+    "web": ("browser", ()),
+}
+"""The marker of the tests of a folder or module, and the packages without which it is skipped."""
 
 
-@dataclass(frozen=True)
-class Ran:
-    """What a tool left behind: exit code, bytes on stdout and text on stderr."""
-
-    code: int
-    out: bytes
-    err: str
+def kind_of(path: Path) -> tuple[str | None, tuple[str, ...]]:
+    """The marker and the packages of a module."""
+    place = path.relative_to(TESTS)
+    found = (KINDS.get(str(v)) for v in (place, *place.parents))
+    return next((kind for kind in found if kind), (None, ()))
 
 
-def smooth(width: int, height: int) -> np.ndarray:
-    """Smooth uint8 RGB with a red disc in the middle."""
-    y, x = np.mgrid[0:height, 0:width]
-    picture = np.stack(
-        [60 + 100 * x / width, 80 + 120 * y / height, 120 + 60 * np.sin((x + y) / 12)], axis=2
-    )
-    picture[disc(width, height)] = (220, 60, 40)
-    return picture.astype(np.uint8)
+def lacking(packages: Sequence[str]) -> str | None:
+    """Why tests that need some packages are skipped, or None if all are here."""
+    absent = [name for name in packages if importlib.util.find_spec(name) is None]
+    return f"not installed: {', '.join(absent)}" if absent else None
 
 
-def disc(width: int, height: int) -> np.ndarray:
-    """bool [H, W], a disc in the middle."""
-    y, x = np.mgrid[0:height, 0:width] + 0.5
-    return np.hypot(x - width / 2, y - height / 2) < 0.3 * min(width, height)
+class Skipped(pytest.Module):
+    """A module that is not even imported."""
+
+    def collect(self):
+        pytest.skip(lacking(kind_of(self.path)[1]))
+
+
+def pytest_pycollect_makemodule(module_path, parent):
+    if lacking(kind_of(module_path)[1]):
+        return Skipped.from_parent(parent, path=module_path)
+    return None
+
+
+def pytest_collection_modifyitems(items):
+    """Marks tests by where they lie and what they use."""
+    reason = lacking(ENCODE)
+    for item in items:
+        marker = kind_of(item.path)[0]
+        if marker:
+            item.add_marker(marker)
+        if "data_dir" in item.fixturenames:
+            item.add_marker("data")
+        if reason and item.get_closest_marker("encoder"):
+            item.add_marker(pytest.mark.skip(reason=reason))
 
 
 @pytest.fixture
@@ -53,41 +85,26 @@ def rgba_photo() -> np.ndarray:
 @pytest.fixture(scope="session")
 def small_masks() -> dict[str, np.ndarray]:
     """bool [48, 64]: two masks that do not touch."""
-    bar = np.zeros((48, 64), bool)
-    bar[38:, 4:60] = True
-    return {"disc": disc(64, 48), "bar": bar}
+    return files.masks()
 
 
 @pytest.fixture(scope="session")
-def small_pxi(tmp_path_factory, small_masks) -> Path:
-    """A file of 64x48 pixels with the layers back, bar and disc."""
-    pytest.importorskip("cv2")
-    from proxyimg_codec import encode
-    from proxyimg_codec.encoder.shapes.masks import Region
-
-    picture = smooth(64, 48)
-    picture[small_masks["bar"]] //= 2
-    regions = [Region(name, small_masks[name]) for name in ("bar", "disc")]
-    path = tmp_path_factory.mktemp("small") / "small.pxi"
-    encode(picture, masks=regions, effort=1, jobs=1, texture="implicit").save(path)
-    return path
+def small_pxi(tmp_path_factory) -> Path:
+    """A copy of a file of 64x48 pixels with the layers back, bar and disc."""
+    return Path(shutil.copy(files.SMALL, tmp_path_factory.mktemp("small")))
 
 
 @pytest.fixture(scope="session")
 def moving_pxi(tmp_path_factory) -> Path:
-    """A file of 64x48 pixels with the layers back, bar and disc, of which the last two move."""
-    from tests import moving
-
-    path = tmp_path_factory.mktemp("moving") / "moving.pxi"
-    moving.picture().save(path)
-    return path
+    """A copy of a file of the same size and layers, of which the last two move."""
+    return Path(shutil.copy(files.MOVING, tmp_path_factory.mktemp("moving")))
 
 
 @pytest.fixture
 def made_up_planes(monkeypatch) -> None:
     """Planes of files have the samples that `tests.pyramids` makes up, whatever they hold."""
     from proxyimg_codec.texture import planes
-    from tests import pyramids
+    from tests.support import pyramids
 
     monkeypatch.setattr(planes, "unpack", pyramids.unpacked)
 
@@ -95,7 +112,7 @@ def made_up_planes(monkeypatch) -> None:
 @pytest.fixture
 def pyramid(made_up_planes):
     """A picture of 64x48 pixels with the layers back, bar and disc, all views of one raster."""
-    from tests import pyramids
+    from tests.support import pyramids
 
     return pyramids.picture()
 
@@ -103,21 +120,9 @@ def pyramid(made_up_planes):
 @pytest.fixture(scope="session")
 def data_dir() -> Path:
     """The folder of shared test pictures next to the checkout."""
-    path = Path(__file__).parents[2] / "shared" / "data"
-    if not path.is_dir():
+    if not DATA.is_dir():
         pytest.skip("the shared pictures are not here")
-    return path
-
-
-def one_line(prog: str, text: str) -> None:
-    """Asserts that stderr holds one line `prog: message`, after the usage if argparse refused."""
-    lines = text.splitlines()
-    if lines and lines[0].startswith("usage: "):
-        lines = lines[-1:]
-    assert len(lines) == 1, text
-    assert lines[0].startswith(f"{prog}: ")
-    assert len(lines[0]) > len(prog) + 10
-    assert "Traceback" not in text
+    return DATA
 
 
 @pytest.fixture

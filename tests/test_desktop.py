@@ -16,8 +16,8 @@ import msgpack
 import pytest
 
 from proxyimg_codec.container import chunks
+from tests.support.paths import ROOT
 
-ROOT = Path(__file__).parents[1]
 SHARE = ROOT / "share"
 MAGIC = SHARE / "misc/pxi.magic"
 MIME = SHARE / "mime/packages/proxyimg.xml"

@@ -7,16 +7,15 @@ import shutil
 import subprocess
 import sys
 from importlib.util import find_spec
-from pathlib import Path
 from pkgutil import resolve_name
 
 import numpy as np
 import pytest
 
 from proxyimg_codec.io import raster
-from tests.conftest import disc, smooth
+from tests.support.paths import ROOT
+from tests.support.pictures import disc, smooth
 
-ROOT = Path(__file__).parents[1]
 GUIDE = ROOT / "docs/guide"
 CHAPTERS = re.findall(r"^\d+\. \[.*?\]\((.*?)\)", (GUIDE / "README.md").read_text("utf-8"), re.M)
 PAGES = ["README.md", *(f"docs/guide/{name}" for name in CHAPTERS)]
@@ -43,7 +42,6 @@ def commands(page):
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    pytest.importorskip("cv2")
     path = tmp_path_factory.mktemp("docs")
     raster.write(path / "photo.png", smooth(96, 64))
     (path / "masks").mkdir()

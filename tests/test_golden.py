@@ -1,12 +1,9 @@
 """Files of earlier versions of the format, kept for ever, and the pictures they always were."""
 
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from conformance import judge, pixels
 from proxyimg_codec import from_bytes

@@ -1,7 +1,6 @@
 """Limits are one budget for all parts of a file, and for all of a picture that is drawn."""
 
-from dataclasses import fields, replace
-from pathlib import Path
+from dataclasses import replace
 
 import msgpack
 import numpy as np
@@ -16,13 +15,12 @@ from proxyimg_codec.container.undo import Step
 from proxyimg_codec.errors import FormatError, LimitError
 from proxyimg_codec.geometry.coverage import coverage
 from proxyimg_codec.geometry.warp import barycentric
-from proxyimg_codec.limits import DEFAULT_LIMITS, SMALL_FILE, Limits
+from proxyimg_codec.limits import DEFAULT_LIMITS, SMALL_FILE, Budget, Limits
 from proxyimg_codec.model import Layers
 from proxyimg_codec.validation.validate import validate
-from tests import moving
+from tests.support import moving
 from tests.support.images import changed
-
-ROOT = Path(__file__).parents[1]
+from tests.support.paths import ROOT
 
 
 @pytest.fixture(scope="module")
@@ -49,13 +47,11 @@ def first_that_works(name, work):
 
 def test_a_budget_adds_up_and_limits_do_not():
     limits = Limits(faces=10)
-    limits.spend("faces", 6)
-    limits.spend("faces", 6)
-    budget = limits.budget()
-    assert budget.budget() is budget
-    assert [getattr(budget, f.name) for f in fields(Limits)] == [
-        getattr(limits, f.name) for f in fields(Limits)
-    ]
+    limits.check("faces", 6)
+    limits.check("faces", 6)
+    other, budget = Budget(limits), Budget(limits)
+    assert other.limits is budget.limits is limits
+    other.spend("faces", 6)
     budget.spend("faces", 6)
     budget.spend("gates", 6)
     budget.spend("faces", 4)
@@ -175,12 +171,12 @@ def test_work_counts_edges_and_their_pieces():
                        [0, 9], [0, 9], [0, 0]], np.int64) * 256  # fmt: skip
 
     def covered(limits):
-        coverage([square], 0, 0, 10, 10, limits)
+        coverage([square], 0, 0, 10, 10, Budget(limits))
 
-    # Four chords; those that go down or up are cut into pieces by rows.
-    least = first_that_works("work", covered)
-    assert 4 + 2 * 9 < least < 200
-    far = first_that_works("work", lambda limits: coverage([square], 0, 20, 10, 10, limits))
+    # The chords; and their pieces, for those that go down or up are cut by rows.
+    least, chords = first_that_works("work", covered), 48
+    assert 4 + 2 * 9 < least - chords < 200
+    far = first_that_works("work", lambda limits: coverage([square], 0, 20, 10, 10, Budget(limits)))
     assert far == 0
 
 
@@ -198,10 +194,10 @@ def test_points_on_a_mesh_are_bounded_even_if_its_faces_hold_them():
     nodes = np.array([[0, 0], [1000, 0], [0, 1000]])
     points = np.full((480, 2), 100)
     faces = np.array([[0, 1, 2]] * 50, np.int32)
-    found, _ = barycentric(points, nodes, faces, Limits(beyond=500))
+    found, _ = barycentric(points, nodes, faces, Budget(Limits(beyond=500)))
     assert (found == 0).all()
     with pytest.raises(LimitError, match="beyond"):
-        barycentric(points, nodes, faces, Limits(beyond=499))
+        barycentric(points, nodes, faces, Budget(Limits(beyond=499)))
 
 
 def history(content):

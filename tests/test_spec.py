@@ -1,16 +1,12 @@
 import hashlib
 import importlib
 import re
-import sys
 from dataclasses import fields, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from conformance import pixels
 from conformance.cases import load
@@ -18,18 +14,19 @@ from proxyimg_codec.api import from_bytes
 from proxyimg_codec.container import chunks, file
 from proxyimg_codec.entropy import arrays, laplace, rans
 from proxyimg_codec.errors import FormatError
-from proxyimg_codec.geometry import boundary, coverage, deltas, mesh, pose, warp
+from proxyimg_codec.geometry import boundary, connectivity, coverage, deltas, mesh, pose, warp
 from proxyimg_codec.geometry.mesh import Base, Mesh
 from proxyimg_codec.geometry.pose import REST, Pose
 from proxyimg_codec.limits import Limits
 from proxyimg_codec.model import Layer, Layers
 from proxyimg_codec.texture import context, diffusion, planes, pyramid, registered_model
 from proxyimg_codec.texture.implicit import ImplicitTexture
+from proxyimg_codec.texture.latents import Latents
 from proxyimg_codec.texture.network import NetShape, Network
-from tests.geometry.test_mesh import lattice
 from tests.support.images import image as image_of
+from tests.support.meshes import lattice
+from tests.support.paths import ROOT
 
-ROOT = Path(__file__).parents[1]
 SPEC = ROOT / "spec"
 NUMBERED = sorted(SPEC.glob("[0-9]*.md"), key=lambda p: int(p.name.partition("-")[0]))
 CHAPTERS = {p.name: p.read_text("utf-8") for p in (SPEC / "README.md", *NUMBERED)}
@@ -130,7 +127,7 @@ def table(chapter):
         ("4-entropy.md", (rans, arrays), 7),
         ("5-geometry.md", (boundary, coverage), 5),
         ("7-implicit.md", (diffusion,), 2),
-        ("6-mesh-and-pose.md", (mesh, pose, warp), 17),
+        ("6-mesh-and-pose.md", (connectivity, mesh, pose, warp), 17),
         ("8-pyramid.md", (registered_model, context, laplace, planes, pyramid), 10),
     ],
 )
@@ -453,7 +450,7 @@ def random_planes(rng, size, levels, components, spread):
     cells.flat[0] = True
     shifts = tuple(rng.integers(-8, 8, 2 * levels).tolist())
     step = int(rng.integers(0, 641))
-    latents = planes.Latents(tuple(found), lowest)
+    latents = Latents(tuple(found), lowest)
     return planes.encoded(latents, size, step, cells, cell, components, 1, shifts)
 
 

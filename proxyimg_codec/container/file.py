@@ -220,4 +220,5 @@ def present(c: Container) -> list[Chunk]:
         chunks.append(Chunk(tree.TYPE, pack(tree.FIELDS, c.tree)))
     if c.motion is not None:
         chunks.append(Chunk(motn.TYPE, pack(motn.FIELDS, c.motion)))
-    return [*chunks, *c.extra]
+    # Where these stood in the file that they are from is no part of the picture.
+    return [*chunks, *(Chunk(v.type, v.payload) for v in c.extra)]

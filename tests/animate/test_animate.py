@@ -1,20 +1,16 @@
 """A picture gets a motion."""
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from proxyimg_codec import from_bytes
 from proxyimg_codec.animate.animate import amplitude, boxes, preset
 from proxyimg_codec.animate.motion import PRESETS, Handle, Key, LayerMotion, Motion
 from proxyimg_codec.errors import LimitError, UsageError
 from proxyimg_codec.model import Layers
-from tests import pyramids
+from tests.support import pyramids
 from tests.support.images import changed
 
 SHORT = {"duration": 0.5, "fps": 12}

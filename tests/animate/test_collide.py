@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from proxyimg_codec.animate.collide import Layers, Outline, Walls, inside
-from tests.animate.shapes import sheet
+from tests.support.bodies import sheet
 
 
 def outlines(*bodies):

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from proxyimg_codec.animate.constraints import Areas, Attachments, Distances, Shape, colours
-from tests.animate.shapes import areas, sheet
+from tests.support.bodies import areas, sheet
 
 STEP = 1 / 96
 STIFF = 1e6

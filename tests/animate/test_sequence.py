@@ -1,13 +1,9 @@
 """Moments and frames of a picture that moves."""
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from proxyimg_codec.animate.sequence import frames, times
 from proxyimg_codec.api import Image
@@ -17,7 +13,7 @@ from proxyimg_codec.geometry.track import Track
 from proxyimg_codec.model import Layers
 from proxyimg_codec.render.compose import outline
 from proxyimg_codec.render.view import make_view
-from tests import moving
+from tests.support import moving
 from tests.support.images import changed
 
 TIMES = [0.0, 0.2, 0.4, 0.9, 1.3]

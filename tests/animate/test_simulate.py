@@ -21,7 +21,7 @@ from proxyimg_codec.animate.motion import (
 from proxyimg_codec.animate.simulate import Body, simulate
 from proxyimg_codec.animate.system import System
 from proxyimg_codec.errors import UsageError
-from tests.animate.shapes import areas, box, sheet
+from tests.support.bodies import areas, box, sheet
 from tests.support.images import changed
 
 CANVAS = (200, 160)

@@ -4,24 +4,17 @@ import csv
 import multiprocessing
 import shutil
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-pytest.importorskip("cv2")
-pytest.importorskip("matplotlib")
-pytest.importorskip("imagecodecs")
 
 from proxyimg_codec.bench import peers, rd, rows, summary
 from proxyimg_codec.bench.measure import bd_rate, psnr
 from proxyimg_codec.bench.rows import Row, read_csv
 from proxyimg_codec.io import raster
-
-from . import fakes
-from .fakes import fake, folder_of, picture
-
-ROOT = Path(__file__).parents[2]
+from tests.support import codecs as fakes
+from tests.support.codecs import fake, folder_of, picture
+from tests.support.paths import ROOT
 
 FAKES = {
     c.name: c

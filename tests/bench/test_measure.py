@@ -3,8 +3,6 @@ import math
 import numpy as np
 import pytest
 
-pytest.importorskip("cv2")
-
 from proxyimg_codec.bench.measure import (
     PSNR_CAP,
     bd_rate,
@@ -16,8 +14,7 @@ from proxyimg_codec.bench.measure import (
     quality_at,
     smooth,
 )
-
-from .fakes import picture
+from tests.support.codecs import picture
 
 CURVE = [(0.1, 26.0), (0.2, 28.4), (0.45, 31.9), (0.8, 34.2), (1.5, 37.5)]
 

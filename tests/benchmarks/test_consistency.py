@@ -5,22 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks import consistency as c
 from proxyimg_codec.edit.transforms import meshed
 from proxyimg_codec.geometry.mesh import FRACTION_BITS
 from proxyimg_codec.geometry.track import Timeline, Track
 from proxyimg_codec.model import Layers
 from proxyimg_codec.render.view import make_view
-
-pytest.importorskip("cv2")
-
-from benchmarks import consistency as c
 from tests.support.images import changed
 
 
 @pytest.fixture
 def moved(pyramid):
     """The disc stands still at 0 and 1 s, and goes right by up to a few pixels between."""
-    disc = meshed(pyramid.layers["disc"])
+    disc = meshed(pyramid.picture, pyramid.layers["disc"].data)
     shape = np.zeros((1, len(disc.mesh.refined.nodes), 2), np.int64)
     shape[..., 0] = 16
     curve = np.array([[0, 0, 0, 256, 256, 0, 0]], np.int64)

@@ -20,7 +20,7 @@ SMALL = ("--size", "48x32")
 @pytest.fixture(scope="session")
 def still_pxi(tmp_path_factory) -> Path:
     """A file of 64x48 pixels with the layers back, bar and disc, which does not move."""
-    from tests import pyramids
+    from tests.support import pyramids
 
     path = tmp_path_factory.mktemp("still") / "still.pxi"
     pyramids.implicit().save(path)
@@ -325,7 +325,7 @@ def test_the_input_is_never_overwritten(tool, still_pxi):
 
 
 def test_a_picture_without_layers_that_can_move(tool, tmp_path):
-    from tests import pyramids
+    from tests.support import pyramids
 
     image = pyramids.implicit()
     alone = image.layers["bar"].removed().layers["disc"].removed().baked()

@@ -120,8 +120,8 @@ def test_engines_agree(decode, image, engine, monkeypatch):
     if engine == "native" and not engines.kernel.available():
         pytest.skip("the kernel is not compiled")
     used = []
-    run = engines.ENGINES[engine]
-    monkeypatch.setitem(engines.ENGINES, engine, lambda *a: used.append(engine) or run(*a))
+    run = engines.find(engine)
+    monkeypatch.setitem(engines.BUILT_IN, engine, lambda *a: used.append(engine) or run(*a))
     pixels = decode("--engine", engine).astype(int)
     assert used
     assert abs(pixels - image.render(engine="numpy")).max() <= 1

@@ -6,6 +6,7 @@ import pytest
 
 import proxyimg_codec as pxi
 from proxyimg_codec.io import raster
+from tests.support.edits import FLAGS
 
 
 @pytest.fixture
@@ -17,41 +18,6 @@ def work(small_pxi, tmp_path):
 def edited(tool, work, *words):
     tool("edit", work / "in.pxi", work / "out.pxi", *words, "--force")
     return pxi.open(work / "out.pxi")
-
-
-FLAGS = [
-    (["--move", "disc", "-4,2.5"], {"op": "move", "layer": "disc", "by": [-4.0, 2.5]}),
-    (["--rotate", "disc", "30"], {"op": "rotate", "layer": "disc", "degrees": 30.0}),
-    (["--rotate", "2", "-30@1,2"],
-     {"op": "rotate", "layer": 2, "degrees": -30.0, "pivot": [1.0, 2.0]}),
-    (["--scale", "disc", "1.5"], {"op": "scale", "layer": "disc", "by": [1.5, 1.5]}),
-    (["--scale", "disc", "1.5,2@0,0"],
-     {"op": "scale", "layer": "disc", "by": [1.5, 2.0], "pivot": [0.0, 0.0]}),
-    (["--shear", "disc", "0.2,0"], {"op": "shear", "layer": "disc", "by": [0.2, 0.0]}),
-    (["--affine", "disc", "1,0,0.1,1,2,3"],
-     {"op": "affine", "layer": "disc", "matrix": [1.0, 0.0, 0.1, 1.0, 2.0, 3.0]}),
-    (["--flip", "disc", "vertical"], {"op": "flip", "layer": "disc", "axis": "vertical"}),
-    (["--drag", "disc", "32,14:-5,1", "32,34:0,0"],
-     {"op": "drag", "layer": "disc", "handles": [[32.0, 14.0, -5.0, 1.0], [32.0, 34.0, 0.0, 0.0]]}),
-    (["--point", "disc", "0,3", "-2,1"],
-     {"op": "point", "layer": "disc", "path": 0, "point": 3, "by": [-2.0, 1.0]}),
-    (["--remove", "disc"], {"op": "remove", "layer": "disc"}),
-    (["--duplicate", "disc"], {"op": "duplicate", "layer": "disc"}),
-    (["--duplicate", "disc=moon"], {"op": "duplicate", "layer": "disc", "name": "moon"}),
-    (["--rename", "disc=sun"], {"op": "rename", "layer": "disc", "name": "sun"}),
-    (["--order", "disc", "1"], {"op": "order", "layer": "disc", "to": 1}),
-    (["--order", "bar", "front"], {"op": "order", "layer": "bar", "to": "front"}),
-    (["--hide", "disc"], {"op": "hide", "layer": "disc"}),
-    (["--still", "disc"], {"op": "still", "layer": "disc"}),
-    (["--opacity", "disc", ".5"], {"op": "opacity", "layer": "disc", "value": 0.5}),
-    (["--texture", "disc=bar"], {"op": "texture", "layer": "disc", "source": "bar"}),
-    (["--texture", "disc=bar@shape"],
-     {"op": "texture", "layer": "disc", "source": "bar", "fit": "shape"}),
-    (["--recolour", "disc", "hue:40,#102030"],
-     {"op": "recolour", "layer": "disc", "hue": 40.0, "tint": "#102030"}),
-    (["--group", "both=disc,1"], {"op": "group", "layers": ["disc", 1], "name": "both"}),
-    (["--parent", "disc=bar"], {"op": "parent", "layer": "disc", "to": "bar"}),
-]  # fmt: skip
 
 
 @pytest.mark.parametrize(("words", "operation"), FLAGS)
@@ -194,6 +160,7 @@ def test_an_output_is_needed_and_not_replaced(tool, work):
 
 
 def test_outlines_come_back_from_svg(tool, work):
+    pytest.importorskip("svgelements")
     tool("decode", work / "in.pxi", work / "shapes.svg")
     same = edited(tool, work, "--outlines", work / "shapes.svg", "--bake")
     assert same.to_bytes() == (work / "in.pxi").read_bytes()
@@ -206,6 +173,7 @@ def test_outlines_come_back_from_svg(tool, work):
 
 
 def test_decoding_shows_the_edit(tool, work):
+    pytest.importorskip("OpenImageIO")
     edited(tool, work, "--remove", "disc")
     tool("decode", work / "out.pxi", work / "out.png")
     pixels = raster.read(work / "out.png").pixels

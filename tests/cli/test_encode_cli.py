@@ -9,16 +9,14 @@ import time
 from pathlib import Path
 
 import numpy as np
+import OpenImageIO as oiio
 import pytest
 
 import proxyimg_codec as pxi
 from proxyimg_codec.io.psnr import psnr_8bit
 from proxyimg_codec.io.raster import encode_png, encode_ppm, write
+from tests.support.paths import ROOT
 
-pytest.importorskip("cv2")
-oiio = pytest.importorskip("OpenImageIO")
-
-ROOT = Path(__file__).parents[2]
 TINY = ("-e", "1", "-j", "1")
 
 

@@ -1,13 +1,13 @@
 """`--limit` of all tools that read `.pxi` files."""
 
 from dataclasses import fields
-from pathlib import Path
 
 import pytest
 
 from proxyimg_codec.limits import Limits
+from tests.support.paths import ROOT
 
-EXAMPLE = Path(__file__).parents[2] / "spec" / "example.pxi"
+EXAMPLE = ROOT / "spec" / "example.pxi"
 
 TOOLS = {
     "animate": ("--preset", "breathe"),

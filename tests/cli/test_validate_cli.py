@@ -3,7 +3,6 @@
 import json
 import os
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -11,10 +10,9 @@ from conformance.cases import FOLDER
 from proxyimg_codec.cli.validate import RESULTS
 from proxyimg_codec.container.chunks import Chunk, read, write
 from proxyimg_codec.validation.warnings import CODES
-from tests import pyramids
+from tests.support import pyramids
 from tests.support.images import changed
-
-ROOT = Path(__file__).parents[2]
+from tests.support.paths import ROOT
 
 
 def case(name):

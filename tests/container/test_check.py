@@ -1,12 +1,7 @@
 """What can be refused before anything is decoded."""
 
-import sys
-from pathlib import Path
-
 import msgpack
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from conformance.make.refused.poses import CASES, COPY_TEXR, DISC_TEXR, Clear, Odd, Posed
 from proxyimg_codec.container import texr

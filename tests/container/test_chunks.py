@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from proxyimg_codec.container.chunks import PREFIX, READABLE, SIGNATURE, VERSION, Chunk, read, write
 from proxyimg_codec.errors import FormatError, LimitError, UnsupportedError
-from proxyimg_codec.limits import Limits
+from proxyimg_codec.limits import Budget, Limits
 
 TAIL = Chunk("TAIL", b"")
 
@@ -93,6 +93,6 @@ def test_known_versions_are_read(minor, known):
 
 def test_limits_hold():
     with pytest.raises(LimitError, match="chunks"):
-        read(FILE, Limits(chunks=2))
+        read(FILE, Budget(Limits(chunks=2)))
     with pytest.raises(LimitError, match="file bytes"):
-        read(FILE, Limits(file_bytes=10))
+        read(FILE, Budget(Limits(file_bytes=10)))

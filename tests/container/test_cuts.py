@@ -9,9 +9,9 @@ from proxyimg_codec.container.file import parse, serialize
 from proxyimg_codec.errors import LimitError
 from proxyimg_codec.limits import Limits
 from proxyimg_codec.model import Layers
-from tests.container.test_pyramid_file import refused
-from tests.pyramids import cut_picture
+from tests.support.containers import refused
 from tests.support.images import changed
+from tests.support.pyramids import cut_picture
 
 CUTS = [
     (1, {"cuts": [0, 2]}, "TEXR: cuts do not ascend, lie behind, or do not exist"),

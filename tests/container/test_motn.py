@@ -1,15 +1,11 @@
 """mOTN: round trips, what is refused and where, and what a small file cannot ask for."""
 
-import sys
 import tracemalloc
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 import zstandard
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import proxyimg_codec as pxi
 from conformance.make.refused.motion import CASES, LINE, MOTION, Moving
@@ -20,7 +16,7 @@ from proxyimg_codec.errors import FormatError, LimitError
 from proxyimg_codec.geometry.track import Track
 from proxyimg_codec.limits import Limits
 from proxyimg_codec.model import Layers
-from tests import moving
+from tests.support import moving
 from tests.support.images import changed
 
 BASE = Moving()

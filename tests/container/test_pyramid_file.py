@@ -13,9 +13,10 @@ from proxyimg_codec.container.texr import PYRAMID_FIELDS
 from proxyimg_codec.errors import FormatError, LimitError
 from proxyimg_codec.limits import Limits
 from proxyimg_codec.model import Layers
-from tests import pyramids
-from tests.pyramids import implicit, layers, picture, planes, view
+from tests.support import pyramids
+from tests.support.containers import refused
 from tests.support.images import changed
+from tests.support.pyramids import implicit, layers, picture, planes, view
 
 
 @pytest.fixture
@@ -77,18 +78,6 @@ def test_equal_views_are_stored_once(pyramid):
     again = pxi.from_bytes(image.to_bytes())
     assert again.layers["a"].texture is again.layers["b"].texture is again.layers["disc"].texture
     assert again.to_bytes() == image.to_bytes()
-
-
-def refused(image, part, number, values, message, base=FormatError):
-    """Asserts that a file with changed fields is refused."""
-    container = parse(image.to_bytes())
-    old = getattr(container, part)
-    new = {**old, **values} if part == "head" else list(old)
-    if part != "head":
-        new[number] = {**old[number], **values}
-        new = tuple(new)
-    with pytest.raises(base, match=message):
-        parse(serialize(replace(container, **{part: new})))
 
 
 PARTS = [

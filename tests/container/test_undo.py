@@ -1,5 +1,3 @@
-from pathlib import Path
-
 import msgpack
 import pytest
 from hypothesis import given
@@ -11,7 +9,8 @@ from proxyimg_codec.container.chunks import Chunk, read, write
 from proxyimg_codec.container.fields import pack, unpack
 from proxyimg_codec.container.undo import Step
 from proxyimg_codec.errors import FormatError, LimitError
-from proxyimg_codec.limits import DEFAULT_LIMITS, Limits
+from proxyimg_codec.limits import DEFAULT_LIMITS, Budget, Limits
+from tests.support.paths import TESTS
 
 PRESENT = [Chunk("HEAD", b"h"), Chunk("LAYR", b"a"), Chunk("LAYR", b"a"), Chunk("TEXR", b"t" * 99)]
 TAIL = Chunk("TAIL", b"")
@@ -21,7 +20,7 @@ steps = st.builds(Step, st.text(max_size=9), st.lists(chunks, max_size=6).map(tu
 
 
 def decode(chunk, present=PRESENT, limits=DEFAULT_LIMITS):
-    return undo.decode(chunk, present, "chunk uNDO", limits)
+    return undo.decode(chunk, present, "chunk uNDO", Budget(limits))
 
 
 @given(st.lists(chunks, min_size=1, max_size=6), st.lists(steps, min_size=1, max_size=4))
@@ -67,7 +66,7 @@ def test_steps_refer_to_states_that_open(small_pxi):
 
 def test_old_histories_share_chunks_with_the_present_once_saved():
     """Version 0.2 wrote other payloads than today; kept as they were, nothing would be shared."""
-    old = Path(__file__).parents[1].joinpath("golden/0.2/edited.pxi").read_bytes()
+    old = TESTS.joinpath("golden/0.2/edited.pxi").read_bytes()
     assert read(old)[0].payload[0] < 0x90
     image = from_bytes(old)
     kept = {c.payload[0] >> 4 for step in image.history for c in step.chunks}

@@ -1,23 +1,20 @@
 """Every edit of a picture that moves."""
 
 import json
-import sys
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import proxyimg_codec as pxi
 from conformance.make.builders import Numbers, texture
 from conformance.make.valid.motion import moving as with_tracks
 from conformance.make.valid.motion import track as random_track
-from proxyimg_codec.edit.transforms import meshed
 from proxyimg_codec.errors import UsageError
+from proxyimg_codec.geometry.mesher import derived
 from proxyimg_codec.model import Layers
-from tests import moving
-from tests.edit.test_operations import EDITS
+from tests.support import moving
+from tests.support.edits import EDITS
 from tests.support.images import changed
 
 T = 0.4
@@ -143,10 +140,11 @@ def test_the_order_of_layers_is_that_of_their_tracks(image):
 def test_a_layer_that_moves_is_no_background(image):
     # A whole canvas that moves, behind everything once the back is removed.
     sheet = changed(image.layers["back"], name="sheet", texture=texture(Numbers("sheet")))
-    sheet = meshed(sheet, 0.3)
+    sheet = replace(sheet, mesh=derived(sheet.boundary, image.picture.size, 0.3))
     layers = Layers([image.layers["back"], sheet])
     track = random_track(Numbers("track"), sheet.mesh, moving.LOOP)
-    two = with_tracks(changed(image, layers=layers), moving.LOOP, {"sheet": track})
+    still = changed(image, layers=layers).picture
+    two = pxi.Image(with_tracks(still, moving.LOOP, {"sheet": track}))
     for one in (two.layers["back"].removed(), two.layers["sheet"].reordered(0)):
         assert not one.opaque
         again = pxi.from_bytes(one.to_bytes())

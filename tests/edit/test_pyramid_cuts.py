@@ -2,7 +2,6 @@
 
 import io
 import zipfile
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,9 +17,9 @@ from proxyimg_codec.model import Layers
 from proxyimg_codec.render.compose import outline
 from proxyimg_codec.render.view import make_view
 from proxyimg_codec.texture.occlusion import ALL_IN_PLACE, ALL_REMOVED, Moved, Occlusion
-from tests.edit.test_operations import EDITS, covered, grown
-from tests.pyramids import SIZE, cut_picture, implicit, planes, view
-from tests.texture.test_occlusion import near
+from tests.support.edits import EDITS, covered, grown, near
+from tests.support.images import changed
+from tests.support.pyramids import SIZE, cut_picture, implicit, planes, view
 
 
 @pytest.fixture
@@ -59,15 +58,15 @@ def test_files_come_back_to_the_byte(cut):
     assert kinds(cut) == [[1, 2], [1, 2], [2]]
     again = same_when_loaded(cut)
     back, bar, disc = again.layers
-    assert back.texture.occlusion.fronts == (bar.boundary, disc.boundary)
-    assert (bar.texture.occlusion.own, back.texture.occlusion.own) == (bar.boundary, None)
-    assert disc.texture.occlusion.box == disc.box
+    assert back.texture.cuts.fronts == (bar.boundary, disc.boundary)
+    assert (bar.texture.cuts.own, back.texture.cuts.own) == (bar.boundary, None)
+    assert disc.texture.cuts.box == disc.box
 
 
 def test_the_hole_is_not_what_was_there(cut):
     hole = cut.render(layers=["back"])
-    flat = replace(cut.layers["back"], texture=view(planes("colour")))
-    shown = replace(cut, layers=Layers([flat]), info=None).render()
+    flat = changed(cut.layers["back"], texture=view(planes("colour")))
+    shown = changed(cut, layers=Layers([flat]), info=None).render()
     inside = np.hypot(*(np.mgrid[0:48, 0:64] - np.array([24, 32])[:, None, None])) < 12
     assert np.abs(hole.astype(int) - shown)[inside].mean() > 10
     np.testing.assert_array_equal(hole[:9], shown[:9])
@@ -158,7 +157,7 @@ def test_masks_are_of_what_is_gone_and_cuts_of_what_is_left(cut):
     same_when_loaded(moved)
     removed = cut.layers["bar"].removed().layers["disc"].moved(0, -7)
     np.testing.assert_array_equal(removed.render(), moved.render())
-    shown = removed.layers["back"].texture.kept(removed.layers["back"].apart)
+    shown = removed.layers["back"].texture.kept(removed.layers["back"].moved_neighbours)
     assert not (shown & near(covered(cut, "disc"))).any()
     hidden = cut.layers["bar"].hidden().layers["disc"].with_point(0, 0, 3, 1)
     expected = cut.layers["disc"].texture.masked(Moved(behind=ALL_REMOVED)).mask
@@ -320,7 +319,7 @@ def stack(boxes, boundaries, numbers, placed=True):
     """
     colour = planes("colour")
     layers = [
-        replace(
+        changed(
             cut_picture(colour).layers[0],
             name=str(k),
             box=box,
@@ -333,7 +332,7 @@ def stack(boxes, boundaries, numbers, placed=True):
         )
         for k, (box, boundary, by) in enumerate(zip(boxes, boundaries, numbers, strict=True))
     ]
-    return replace(cut_picture(colour), layers=Layers(layers), info=None)
+    return changed(cut_picture(colour), layers=Layers(layers), info=None)
 
 
 @pytest.mark.parametrize("region", [None, (20, 11, 23, 17)])

@@ -10,9 +10,9 @@ import proxyimg_codec as pxi
 from proxyimg_codec.errors import UsageError
 from proxyimg_codec.model import Layers
 from proxyimg_codec.texture.pyramid import PyramidTexture
-from tests.edit.test_operations import EDITS, covered, grown
-from tests.pyramids import implicit, picture, planes, view
+from tests.support.edits import EDITS, covered, grown
 from tests.support.images import changed
+from tests.support.pyramids import implicit, picture, planes, view
 
 
 def saved(image, path):
@@ -152,11 +152,11 @@ def test_a_box_fit_stretches_the_part(pyramid):
 @pytest.mark.parametrize("fit", ["box", "shape"])
 def test_textures_from_an_implicit_file(pyramid, tmp_path, fit):
     other = saved(implicit(), tmp_path / "implicit.pxi")
-    changed = pyramid.layers["disc"].textured(other, "bar", fit).baked()
-    again = pxi.from_bytes(changed.to_bytes())
+    given = pyramid.layers["disc"].textured(other, "bar", fit).baked()
+    again = pxi.from_bytes(given.to_bytes())
     assert len(again.networks) == 1
     assert [v.network for v in again.layers] == [None, None, again.networks[0]]
-    np.testing.assert_array_equal(again.render(), changed.render())
+    np.testing.assert_array_equal(again.render(), given.render())
     shown = again.render(layers=["disc"], engine="numpy")
     assert (covered(again, "disc") == (shown[..., 3] > 0)).all()
     if fit == "box":
@@ -218,7 +218,7 @@ def test_node_sampled_layers_lend_and_borrow(pyramid, tmp_path):
     from conformance.make.builders import Numbers
     from conformance.make.valid.samplings import CASES
 
-    nodes = saved(CASES["node"].build(Numbers("node")), tmp_path / "node.pxi")
+    nodes = saved(pxi.Image(CASES["node"].build(Numbers("node"))), tmp_path / "node.pxi")
     changed = pyramid.layers["disc"].textured(nodes, "ring")
     assert changed.layers["disc"].sampling == 1
     assert pxi.from_bytes(changed.to_bytes()).render().shape == (48, 64, 3)

@@ -128,7 +128,7 @@ def test_a_texture_is_what_its_source_shows(image, fit):
 
 def test_textures_at_nodes_fit_no_other_outline(image):
     node = image.layers["bar"]
-    layers = [changed(v, sampling=3) if v is node else v for v in image.layers]
+    layers = [changed(v, sampling=3) if v == node else v for v in image.layers]
     sampled = changed(image, layers=type(image.layers)(layers))
     assert sampled.layers["disc"].textured("bar").layers["disc"].sampling == 3
     with pytest.raises(UsageError, match="box to box"):
@@ -161,7 +161,7 @@ def test_layers_of_files_by_position(image, small_pxi):
 
 
 def test_the_list_tells_what_is_covered_not_where_control_points_are(image):
-    x0, y0, x1, y1 = listing(image)["layers"][2]["bounds"]
+    x0, y0, x1, y1 = listing(image.picture)["layers"][2]["bounds"]
     alone = image.render(layers=["disc"])[..., 3]
     rows, columns = np.flatnonzero(alone.any(1)), np.flatnonzero(alone.any(0))
     assert abs(x0 - columns[0]) <= 1

@@ -1,14 +1,14 @@
 import json
-from pathlib import Path
 
-import jsonschema
 import pytest
 
 from proxyimg_codec.edit import script
-from tests.cli.test_edit_cli import FLAGS
-from tests.edit.test_operations import BAD
+from tests.support.edits import BAD, FLAGS
+from tests.support.paths import ROOT
 
-PUBLISHED = Path(__file__).parents[2] / "docs" / "edits.schema.json"
+jsonschema = pytest.importorskip("jsonschema")
+
+PUBLISHED = ROOT / "docs" / "edits.schema.json"
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ from proxyimg_codec.encoder.shapes.masks import Region
 from proxyimg_codec.geometry.coverage import FULL, coverage
 from proxyimg_codec.io.psnr import psnr_8bit
 from proxyimg_codec.render.quality import psnr
-from tests.conftest import disc, smooth
+from tests.support.pictures import disc, smooth
 
 FAST = {"texture": "implicit", "effort": 2, "jobs": 1}
 

@@ -9,19 +9,6 @@ import numpy as np
 import pytest
 
 import proxyimg_codec as pxi
-from proxyimg_codec.export import openraster as export
-from proxyimg_codec.export.common import at_full_opacity
-from proxyimg_codec.io import xml
-from proxyimg_codec.io.psnr import psnr_8bit
-from proxyimg_codec.io.raster import encode_png
-from proxyimg_codec.limits import Limits
-from proxyimg_codec.render.quality import psnr
-from tests.conftest import smooth
-from tests.test_pictures import icc
-
-pytest.importorskip("cv2")
-pytest.importorskip("OpenImageIO")
-
 from proxyimg_codec.encoder.import_layers import composite, encode_layers
 from proxyimg_codec.encoder.openraster import (
     LayeredPicture,
@@ -30,6 +17,14 @@ from proxyimg_codec.encoder.openraster import (
     read_openraster,
 )
 from proxyimg_codec.encoder.settings import Settings
+from proxyimg_codec.export import openraster as export
+from proxyimg_codec.export.common import at_full_opacity
+from proxyimg_codec.io import xml
+from proxyimg_codec.io.psnr import psnr_8bit
+from proxyimg_codec.io.raster import encode_png
+from proxyimg_codec.limits import Limits
+from proxyimg_codec.render.quality import psnr
+from tests.support.pictures import icc, smooth
 
 W, H = 64, 48
 FAST = Settings(effort=1, jobs=1)
@@ -287,13 +282,19 @@ SCENE = stack(
 
 @pytest.fixture(scope="module")
 def scene() -> pxi.Image:
-    image, kept = encode_layers(SCENE, FAST)
+    image, kept = encoded(SCENE, FAST)
     assert kept.layers == SCENE.layers
     return pxi.from_bytes(image.to_bytes())
 
 
+def encoded(picture, settings):
+    """The image that a stack becomes, and what was kept of the stack."""
+    image, kept = encode_layers(picture, settings)
+    return pxi.Image(image), kept
+
+
 def alone(image: pxi.Image, name: str, **view) -> np.ndarray:
-    return at_full_opacity(image).render(layers=[name], **view)
+    return pxi.Image(at_full_opacity(image.picture)).render(layers=[name], **view)
 
 
 def test_the_picture_is_that_of_the_layers(scene):
@@ -339,7 +340,7 @@ def test_areas_are_those_that_can_be_seen(scene):
 @pytest.mark.parametrize("attributes", [{"hidden": True}, {"opacity": 0.5}])
 def test_a_back_layer_that_does_not_cover_makes_no_opaque_picture(attributes):
     picture = stack(source("back", smooth(W, H), **attributes), source("a", ball(30, 24, 10)))
-    image, _ = encode_layers(picture, FAST)
+    image, _ = encoded(picture, FAST)
     assert not image.opaque
     got = pxi.from_bytes(image.to_bytes()).render()
     assert got[0, 0, 3] == round(255 * attributes.get("opacity", 0))
@@ -347,7 +348,7 @@ def test_a_back_layer_that_does_not_cover_makes_no_opaque_picture(attributes):
 
 def test_whole_layers_in_front_have_no_boundary():
     front = np.full((H, W, 3), 90, np.uint8)
-    image, _ = encode_layers(stack(source("a", smooth(W, H)), source("b", front)), FAST)
+    image, _ = encoded(stack(source("a", smooth(W, H)), source("b", front)), FAST)
     assert [v.boundary for v in image.layers] == [None, None]
     assert np.abs(image.render().astype(int) - 90).max() <= 2
 
@@ -357,7 +358,7 @@ def test_outlines_do_not_depend_on_the_place():
 
     def boundary(x: int) -> np.ndarray:
         cut = SourceLayer("a", ball(20, 24, 9)[10:40, 5:40], 5 + x, 10)
-        image, _ = encode_layers(stack(cut), FAST)  # one colour: nothing to fit but the outline
+        image, _ = encoded(stack(cut), FAST)  # one colour: nothing to fit but the outline
         assert image.layers["a"].boundary.unit == 3
         return image.layers["a"].boundary.paths[0]
 
@@ -367,19 +368,19 @@ def test_outlines_do_not_depend_on_the_place():
 def test_layers_too_faint_to_be_found_are_left_out():
     dust = np.zeros((H, W, 4), np.uint8)
     dust[20, 20] = (255, 255, 255, 20)
-    image, kept = encode_layers(stack(source("a", smooth(W, H)), source("dust", dust)), FAST)
+    image, kept = encoded(stack(source("a", smooth(W, H)), source("dust", dust)), FAST)
     assert [v.name for v in image.layers] == ["a"]
     assert kept.left_out == ("dust",)
     assert [v.name for v in kept.layers] == ["a"]
     with pytest.raises(pxi.InputError, match="faint"):
-        encode_layers(stack(source("dust", dust)), FAST)
+        encoded(stack(source("dust", dust)), FAST)
 
 
 def test_rims_are_clean():
     """What a transparent pixel's colour is may not be seen in the rim, at any size."""
     pixels = ball(30, 24, 15)
     pixels[pixels[..., 3] < 100, :3] = 0
-    image, _ = encode_layers(stack(source("a", pixels)), FAST)
+    image, _ = encoded(stack(source("a", pixels)), FAST)
     for scale in (1, 3):
         drawn = image.render(scale=scale)
         assert (drawn[drawn[..., 3] > 0][:, :3] == (200, 60, 40)).all()
@@ -389,7 +390,7 @@ def test_crisp_edges_of_soft_layers():
     """Where outline and alpha both end, the rim is not taken off twice."""
     pixels = ball(30.3, 24, 15)
     pixels[..., 3] = pixels[..., 3] * np.clip((48 - X) / 30, 0, 1)
-    image, _ = encode_layers(stack(source("a", pixels)), replace(FAST, effort=3))
+    image, _ = encoded(stack(source("a", pixels)), replace(FAST, effort=3))
     assert image.channels == 4
     error = image.render()[..., 3].astype(int) - pixels[..., 3]
     rim = (pixels[..., 3] > 0) & (np.abs(np.hypot(X - 30.3, Y - 24) - 15) < 0.5) & (X < 20)
@@ -399,20 +400,20 @@ def test_crisp_edges_of_soft_layers():
 
 def test_sixteen_bits():
     deep = smooth(W, H).astype(np.uint16) * 257
-    image, _ = encode_layers(stack(source("a", deep)), FAST)
+    image, _ = encoded(stack(source("a", deep)), FAST)
     assert image.depth == 16
     assert psnr_8bit(smooth(W, H), image.render()) > 28
 
 
 def test_same_input_same_bytes(scene):
-    again, _ = encode_layers(SCENE, replace(FAST, jobs=2))
+    again, _ = encoded(SCENE, replace(FAST, jobs=2))
     assert again.to_bytes() == scene.to_bytes()
 
 
 def test_there_and_back(small_pxi):
     image = pxi.open(small_pxi)
     picture = read_openraster(export.build(image), "a.ora")
-    again, _ = encode_layers(picture, FAST)
+    again, _ = encoded(picture, FAST)
     assert [v.name for v in again.layers] == [v.name for v in image.layers]
     assert psnr_8bit(image.render(), again.render()) > 30
     for layer in image.layers:
@@ -432,7 +433,7 @@ def test_layers_become_layers(tool, tmp_path):
     assert "layer 'clear' has nothing to be seen" in ran.err
     assert "2 layers (sky, ball)" in ran.err
     written = (tmp_path / "a.pxi").read_bytes()
-    expected, _ = encode_layers(read(data), FAST)
+    expected, _ = encoded(read(data), FAST)
     assert written == expected.to_bytes()
     # By content, too.
     tool("encode", "-", tmp_path / "b.pxi", "-e", "1", "-j", "1", stdin=data)

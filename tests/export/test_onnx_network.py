@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from proxyimg_codec.cli.decode import main
-from tests.texture.test_network import NetShape, random_network
+from proxyimg_codec.texture.network import NetShape
+from tests.support.textures import random_network
 
 onnx = pytest.importorskip("onnx")
 onnxruntime = pytest.importorskip("onnxruntime")

@@ -8,57 +8,16 @@ import pytest
 import proxyimg_codec as pxi
 from conformance import pixels
 from conformance.cases import load
-from conformance.judge import difference
 from conformance.make import builders
 from proxyimg_codec.errors import UnsupportedError, UsageError
 from proxyimg_codec.export import onnx_graph
 from proxyimg_codec.export.onnx_renderer import BLOCK, build
 from proxyimg_codec.render.view import make_view
 from proxyimg_codec.texture.network import NetShape, Network
+from tests.support.models import agrees, model_of, samples, view_of
 
 CASES = [case for case in load() if not case.error]
 """All of them can be exported, and none takes long."""
-
-PEAK, RMS = 0.03, 0.003
-"""Largest errors in 8-bit levels: what the expected pictures of 16 bits are rounded by, and
-hardly more."""
-
-
-def view_of(image, args):
-    """The view that the arguments of `Image.render` ask for."""
-    size = image.width, image.height
-    return make_view(size, *(args.get(k) for k in ("width", "height", "scale", "region")))
-
-
-def samples(view):
-    """The inputs of the model for a view: REN-2 and REN-3."""
-    sx, sy = view.supersampling
-    columns, rows = view.width * sx, view.height * sy
-    grid = np.meshgrid(view.columns(0, columns), view.rows(0, rows))
-    size = [view.region_width / columns, view.region_height / rows]
-    return {"points": np.stack(grid, 2).reshape(-1, 2), "pixel_size": np.array(size)}
-
-
-def averaged(colour, view):
-    """The picture float32 [H, W, 4], straight, of the colours of all samples."""
-    assert colour.dtype == np.float32
-    sx, sy = view.supersampling
-    picture = colour.reshape(view.height, sy, view.width, sx, 4).astype(float).mean((1, 3))
-    picture[..., :3] /= np.maximum(picture[..., 3:], 1e-6)
-    return picture.clip(0, 1).astype(np.float32)
-
-
-def model_of(image, args):
-    """The model that the arguments of a render select."""
-    still = image.at(args["time"]) if "time" in args else image
-    return build(still, args.get("layers"), args.get("background", True))
-
-
-def agrees(colour, view, expected):
-    picture = averaged(colour, view)[..., : expected.shape[2]]
-    peak, rms = difference(picture, expected)
-    assert peak <= PEAK
-    assert rms <= RMS
 
 
 def session(model):
@@ -120,7 +79,7 @@ def ring():
         builders.ellipse((4000.3, 3990.7), (6.2, 5.9)),
         builders.ellipse((4000.4, 3990.1), (3.1, 2.3), reverse=True),
     ]
-    return builders.picture(
+    ring = builders.picture(
         (side, side),
         [
             builders.layer("back", (0, 0, side, side), black),
@@ -129,6 +88,7 @@ def ring():
         solid(0.0),
         solid(1.0),
     )
+    return pxi.Image(ring)
 
 
 @pytest.mark.parametrize("width", [31 * 14, 14, 5])
@@ -153,7 +113,7 @@ def test_positions_halfway_between_two_are_rounded_up():
         builders.layer("back", (0, 0, side, side), black),
         builders.layer("stairs", (0, 0, side, side), white, path, unit=10),
     ]
-    image = builders.picture((side, side), layers, solid(0.0), solid(1.0))
+    image = pxi.Image(builders.picture((side, side), layers, solid(0.0), solid(1.0)))
     view, expected = make_view((side, side), width=w), image.render(width=w, dtype=np.float32)
     run, inputs = session(build(image)), samples(view)
     grid = inputs["points"].reshape(w, w, 2)

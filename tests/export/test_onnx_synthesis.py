@@ -9,9 +9,11 @@ import pytest
 import proxyimg_codec as pxi
 from proxyimg_codec.errors import UnsupportedError
 from proxyimg_codec.export.onnx_synthesis import build, feed
-from proxyimg_codec.texture.planes import Latents, Planes, encoded
-from tests.pyramids import implicit, picture
+from proxyimg_codec.model import Layers
+from proxyimg_codec.texture.latents import Latents
+from proxyimg_codec.texture.planes import Planes, encoded
 from tests.support.images import changed
+from tests.support.pyramids import implicit, picture
 
 SIZE = 64, 48
 
@@ -151,7 +153,7 @@ def test_layers_of_several_planes(tool, tmp_path):
     stack = [*image.layers][:2] + [
         changed(v, texture=replace(v.texture, planes=other)) for v in image.layers[2:]
     ]
-    changed(image, layers=pxi.image.Layers(stack)).save(tmp_path / "a.pxi")
+    changed(image, layers=Layers(stack)).save(tmp_path / "a.pxi")
     path = tmp_path / "a.onnx"
     export = "decode", tmp_path / "a.pxi", "--export-onnx", path
     assert "choose one layer with --layer" in tool(*export, code=2).err

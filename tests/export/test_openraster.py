@@ -12,8 +12,8 @@ from proxyimg_codec.export import openraster
 from proxyimg_codec.geometry.boundary import Boundary
 from proxyimg_codec.io.raster import parse
 from proxyimg_codec.model import Layers
-from tests.conftest import smooth
 from tests.support.images import changed
+from tests.support.pictures import smooth
 
 pytest.importorskip("OpenImageIO")
 

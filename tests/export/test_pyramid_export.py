@@ -10,7 +10,7 @@ import pytest
 
 from proxyimg_codec.export import openraster, svg
 from proxyimg_codec.io.raster import parse
-from tests.pyramids import cut_picture, implicit, picture, planes
+from tests.support.pyramids import cut_picture, implicit, picture, planes
 
 
 def layers_of(data):

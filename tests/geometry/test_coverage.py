@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from proxyimg_codec.errors import LimitError
 from proxyimg_codec.geometry.coverage import FULL, ONE, coverage, flatten, to_output
-from proxyimg_codec.limits import Limits
+from proxyimg_codec.limits import Budget, Limits
 from proxyimg_codec.native import kernel
 
 K = 0.5522847498
@@ -117,13 +117,13 @@ def test_the_kernel_does_what_numpy_does(seed, reach):
 def test_the_kernel_counts_work_as_numpy_does():
     rng = np.random.default_rng(1)
     path = rng.integers(-9000, 9000, (30, 2))
-    budgets = Limits().budget(), Limits().budget()
+    budgets = Budget(), Budget()
     coverage([path], 0, 0, 40, 30, budgets[0])
     with_numpy([path], 0, 0, 40, 30, budgets[1])
     assert budgets[0].spent == budgets[1].spent
     work = budgets[0].spent["work"]
     for compute in (coverage, with_numpy):
-        compute([path], 0, 0, 40, 30, Limits(work=work).budget())
+        compute([path], 0, 0, 40, 30, Budget(Limits(work=work)))
         for less in (work - 1, work // 2, 1):
             with pytest.raises(LimitError, match="work"):
-                compute([path], 0, 0, 40, 30, Limits(work=less).budget())
+                compute([path], 0, 0, 40, 30, Budget(Limits(work=less)))

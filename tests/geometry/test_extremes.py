@@ -7,7 +7,7 @@ from proxyimg_codec.errors import LimitError
 from proxyimg_codec.geometry.pose import Pose
 from proxyimg_codec.geometry.raster import rasterize
 from proxyimg_codec.geometry.warp import Warp
-from proxyimg_codec.limits import Limits
+from proxyimg_codec.limits import Budget, Limits
 
 
 def test_a_matrix_that_is_singular_in_floating_point_alone_is_survived():
@@ -21,12 +21,12 @@ def test_narrow_triangles_cost_their_rows():
     narrow = np.array([[(3.6, 0), (3.7, 0), (3.65, 500)]] * 400, float)
     assert (rasterize(narrow[:4], 0, 0, 8, 500) == -1).all()
     with pytest.raises(LimitError, match="overlap"):
-        rasterize(narrow, 0, 0, 8, 500, Limits(overlap=40))
+        rasterize(narrow, 0, 0, 8, 500, Budget(Limits(overlap=40)))
 
 
 def test_triangles_beside_the_window_cost_nothing():
     beside = np.array([[(-9, 0), (-1, 0), (-5, 500)], [(9, 0), (12, 0), (9, 500)]] * 400, float)
-    assert (rasterize(beside, 0, 0, 8, 500, Limits(overlap=0)) == -1).all()
+    assert (rasterize(beside, 0, 0, 8, 500, Budget(Limits(overlap=0))) == -1).all()
 
 
 def test_faces_of_a_mirrored_layer_keep_their_order():

@@ -4,28 +4,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from proxyimg_codec.errors import FormatError, LimitError
-from proxyimg_codec.geometry import mesh
+from proxyimg_codec.geometry import connectivity
 from proxyimg_codec.geometry.mesh import Base, Mesh
-from proxyimg_codec.limits import Limits
-
-
-def lattice(columns, rows, keep=None, step=(412, 400)):
-    """A mesh of triangles on a sheared lattice; `keep` chooses some of them."""
-    points = [(12 * i + 6 * (j % 2), 10 * j) for j in range(rows) for i in range(columns)]
-    triangles = []
-    for j in range(rows - 1):
-        for i in range(columns - 1):
-            a, b = j * columns + i, j * columns + i + 1
-            c, d = a + columns, b + columns
-            triangles += [(a, b, c), (b, d, c)] if j % 2 == 0 else [(a, b, d), (a, d, c)]
-    chosen = np.array(triangles)[slice(None) if keep is None else keep]
-    used, renumbered = np.unique(chosen, return_inverse=True)
-    return Base(
-        (-3, 5),
-        step,
-        np.array(points, np.uint8)[used],
-        renumbered.reshape(-1, 3).astype(np.int32),
-    )
+from proxyimg_codec.limits import Budget, Limits
+from tests.support.meshes import lattice
 
 
 def shape(base):
@@ -87,11 +69,12 @@ def test_refined_faces_conform_and_cover_the_same(seed, first, second):
     # No node lies inside an edge of a face: each inner edge belongs to two faces, and each outer
     # one is a part of the outline of the base.
     directed = edges_of(refined.faces)
-    assert len(set(directed)) == len(directed)
-    border = {e for e in directed if (e[1], e[0]) not in set(directed)}
+    known = set(directed)
+    assert len(known) == len(directed)
+    border = {e for e in directed if (e[1], e[0]) not in known}
     length = sum(np.hypot(*(refined.nodes[a] - refined.nodes[b])) for a, b in border)
-    base_edges = edges_of(mesh_.base.triangles)
-    outer = [e for e in base_edges if (e[1], e[0]) not in set(base_edges)]
+    base_edges = set(edges_of(mesh_.base.triangles))
+    outer = [e for e in base_edges if (e[1], e[0]) not in base_edges]
     want = sum(np.hypot(*(refined.nodes[a] - refined.nodes[b])) for a, b in outer)
     assert length == pytest.approx(want)
     inner = refined.parents[len(mesh_.base.vertices) :]
@@ -162,8 +145,8 @@ def test_refinement_is_bounded():
     plain = Mesh.build(lattice(4, 4))
     fine = plain.split([np.ones(18, bool), np.ones(72, bool)])
     with pytest.raises(LimitError, match="faces"):
-        _ = Mesh(fine.fields, limits=Limits(faces=100)).refined
+        _ = Mesh(fine.fields, budget=Budget(Limits(faces=100))).refined
 
 
 def test_numbers_of_symbols_do_not_meet():
-    assert mesh.BORDER < mesh.NEW < mesh.RANKED < mesh.FAR < 16
+    assert connectivity.BORDER < connectivity.NEW < connectivity.RANKED < connectivity.FAR < 16

@@ -10,7 +10,7 @@ from proxyimg_codec.errors import FormatError
 from proxyimg_codec.geometry import pose
 from proxyimg_codec.geometry.mesh import Mesh
 from proxyimg_codec.geometry.pose import REST, Pose
-from tests.geometry.test_mesh import lattice
+from tests.support.meshes import lattice
 
 UNIT = 1 << 24
 entries = st.integers(1 - (1 << 31), (1 << 31) - 1)

@@ -8,7 +8,7 @@ from proxyimg_codec.geometry.boundary import Boundary
 from proxyimg_codec.geometry.mesh import Mesh
 from proxyimg_codec.geometry.pose import REST, Pose
 from proxyimg_codec.geometry.warp import Warp
-from tests.geometry.test_mesh import lattice
+from tests.support.meshes import lattice
 
 UNIT = 1 << 24
 

@@ -5,7 +5,7 @@ import pytest
 
 import proxyimg_codec as pxi
 from proxyimg_codec import plugins
-from tests.conftest import smooth
+from tests.support.pictures import smooth
 
 
 def left_half(rgb, max_layers, support):
@@ -25,12 +25,14 @@ def added(monkeypatch):
     monkeypatch.setattr(plugins, "entry_points", entry_points)
 
 
+@pytest.mark.encoder
 def test_added_segmenters_are_used(added):
     assert plugins.names("segmenters") == ["regions", "halves"]
     image = pxi.encode(smooth(40, 30), segmenter="halves", effort=1, jobs=1)
     assert [v.name for v in image.layers] == ["right", "left"]
 
 
+@pytest.mark.encoder
 def test_unknown_names_are_refused_with_the_known_ones():
     with pytest.raises(pxi.UsageError, match="regions"):
         pxi.encode(smooth(40, 30), segmenter="magic", effort=1)

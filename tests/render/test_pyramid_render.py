@@ -10,9 +10,9 @@ from proxyimg_codec.errors import FormatError
 from proxyimg_codec.model import Layers
 from proxyimg_codec.render import compose
 from proxyimg_codec.texture.planes import Planes
-from tests.pyramids import SIZE, picture, planes, view
-from tests.render.test_render import ENGINES
 from tests.support.images import changed
+from tests.support.pyramids import SIZE, picture, planes, view
+from tests.support.textures import ENGINES
 
 
 def test_at_rest_the_picture_is_the_raster(pyramid):

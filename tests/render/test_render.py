@@ -10,15 +10,7 @@ from proxyimg_codec.render import compose
 from proxyimg_codec.texture.implicit import ImplicitTexture
 from proxyimg_codec.texture.network import NetShape, Network
 from tests.support.images import image as image_of
-from tests.texture.test_network import random_network
-
-ENGINES = [
-    "numpy",
-    "ort",
-    pytest.param(
-        "native", marks=pytest.mark.skipif(not kernel.available(), reason="kernel not compiled")
-    ),
-]
+from tests.support.textures import ENGINES, random_network
 
 
 def constant(*output):

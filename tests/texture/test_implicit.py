@@ -5,18 +5,10 @@ from proxyimg_codec.errors import FormatError
 from proxyimg_codec.native import kernel
 from proxyimg_codec.render import engines
 from proxyimg_codec.texture.implicit import ImplicitTexture, pack, taps, unpack
-from tests.texture.test_network import NetShape, random_network
+from proxyimg_codec.texture.network import NetShape
+from tests.support.textures import random_network, texture
 
 NETWORK = random_network(NetShape(3, 1, 4, 1, 3), 8)
-
-
-def texture(bits=4, stored=None, rows=6, columns=9):
-    rng = np.random.default_rng(bits)
-    stored = np.ones((rows, columns), bool) if stored is None else stored
-    top = 1 << (bits - 1)
-    codes = np.where(stored, rng.integers(-top, top, (3, rows, columns)), 0).astype(np.int8)
-    steps = np.array([0.1, 0.25, 0.5], np.float16)
-    return ImplicitTexture(0, bits, steps, codes, stored)
 
 
 @pytest.mark.parametrize("bits", range(2, 9))

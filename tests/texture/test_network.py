@@ -9,23 +9,11 @@ from proxyimg_codec.texture.network import (
     LARGE_BLOCK,
     SMALL,
     NetShape,
-    Network,
     encode_features,
     pack,
     unpack,
 )
-
-
-def random_network(shape, bits, seed=0):
-    rng = np.random.default_rng(seed)
-    top = 1 << (bits - 1)
-    return Network(
-        shape,
-        bits,
-        tuple(rng.integers(-top, top, (o, i)).astype(np.int8) for i, o in shape.layers),
-        rng.uniform(0.5, 2, shape.rows).astype(np.float16) / top,
-        rng.normal(0, 0.3, shape.rows).astype(np.float16),
-    )
+from tests.support.textures import random_network
 
 
 @settings(max_examples=20, deadline=None)

@@ -13,7 +13,8 @@ from proxyimg_codec.texture import occlusion as module
 from proxyimg_codec.texture.diffusion import diffused
 from proxyimg_codec.texture.occlusion import ALL_IN_PLACE, ALL_REMOVED, Moved, Occlusion
 from proxyimg_codec.texture.pyramid import FILL_ONE
-from tests.pyramids import planes, view
+from tests.support.edits import near
+from tests.support.pyramids import planes, view
 
 UNIT = 4
 PART = 7, 4, 21, 18
@@ -34,15 +35,6 @@ def share(low, high, pixel):
 edges = st.tuples(*[st.integers(-60, 300)] * 4).map(
     lambda v: (min(v[0], v[1]), min(v[2], v[3]), max(v[0], v[1]) + 1, max(v[2], v[3]) + 1)
 )
-
-
-def near(samples):
-    """Where a sample is set within 2 across and 2 down."""
-    height, width = samples.shape
-    return np.array(
-        [[samples[max(j - 2, 0) : j + 3, max(i - 2, 0) : i + 3].any() for i in range(width)]
-         for j in range(height)]
-    )  # fmt: skip
 
 
 @given(st.none() | edges, st.lists(edges, max_size=3), st.integers(-5, 12), st.integers(-5, 12))

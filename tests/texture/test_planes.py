@@ -9,7 +9,8 @@ from proxyimg_codec.entropy import laplace
 from proxyimg_codec.errors import FormatError
 from proxyimg_codec.native import kernel
 from proxyimg_codec.texture import context, planes, registered_model, synthesis
-from proxyimg_codec.texture.planes import Latents, Planes
+from proxyimg_codec.texture.latents import Encoder, Latents, support_at
+from proxyimg_codec.texture.planes import Planes
 
 needs_kernel = pytest.mark.skipif(not kernel.available(), reason="the kernel was not compiled")
 ENGINES = ["numpy", pytest.param("kernel", marks=needs_kernel)]
@@ -100,7 +101,7 @@ def test_latents_come_back(case):
         assert y.dtype == np.int32
         assert ((y == was) | (y == 0)).all()
         if cells is not None:
-            at = planes.support_at(cells, cell, size, level, len(found.levels))
+            at = support_at(cells, cell, size, level, len(found.levels))
             assert not y[:, ~at].any()
     # What was found has all of it in the stream.
     again = planes.encoded(found, *case[1:])
@@ -315,14 +316,14 @@ def test_strips_do_not_show(monkeypatch):
 
 def test_escapes_are_written_as_the_format_says():
     """Zigzag, 7 bits a byte, low first."""
-    coder = planes._Encoder()
+    coder = Encoder()
     mean, scale = np.array([0, 0, 0, 160]), np.full(4, laplace.CERTAIN + 1)
     coder.code(np.array([100, -100, 8191, 11]), mean, scale)
     assert coder.escapes() == bytes([200 & 127 | 128, 1, 199 & 127 | 128, 1, 0xFE, 0x7F])
 
 
 def test_certain_latents_become_0():
-    coder = planes._Encoder()
+    coder = Encoder()
     scale = np.array([0, laplace.CERTAIN, laplace.CERTAIN + 1])
     got = coder.code(np.array([5, -7, 2]), np.array([4, -4, 4]), scale)
     assert got.tolist() == [0, 0, 2]

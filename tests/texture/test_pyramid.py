@@ -6,7 +6,7 @@ from proxyimg_codec.errors import FormatError
 from proxyimg_codec.texture import pyramid
 from proxyimg_codec.texture.diffusion import diffused
 from proxyimg_codec.texture.pyramid import FILL_ONE, PyramidTexture, unpack
-from tests.pyramids import planes, raster, view
+from tests.support.pyramids import planes, raster, view
 
 PART = 7, 4, 21, 18
 """Of planes of 40x30."""

@@ -1,12 +1,11 @@
 """Nothing that the codec is judged by may enter training."""
 
+import cv2
 import numpy as np
 import pytest
 
-cv2 = pytest.importorskip("cv2")
-
-from proxyimg_codec.errors import InputError  # noqa: E402
-from training import pictures  # noqa: E402
+from proxyimg_codec.errors import InputError
+from training import pictures
 
 
 def test_every_test_picture_is_listed(data_dir):

@@ -2,13 +2,12 @@
 
 import sys
 
+import cv2
 import numpy as np
 import pytest
+import torch
 
-torch = pytest.importorskip("torch")
-cv2 = pytest.importorskip("cv2")
-
-from training import export, pictures, train  # noqa: E402
+from training import export, pictures, train
 
 
 @pytest.fixture

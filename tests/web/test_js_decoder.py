@@ -5,15 +5,14 @@ import queue
 import shutil
 import subprocess
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 
 import pytest
 
 from conformance.cases import load
 from conformance.judge import Ended
 from conformance.runner import run, table
+from tests.support.paths import ROOT
 
-ROOT = Path(__file__).parents[2]
 DECODER = ROOT / "web" / "decode.mjs"
 NODE = shutil.which("node")
 

@@ -11,7 +11,7 @@ import pytest
 import proxyimg_codec as pxi
 from conformance import pixels
 from conformance.cases import find
-from tests.export.test_onnx_renderer import agrees, model_of, samples, view_of
+from tests.support.models import agrees, model_of, samples, view_of
 
 HERE = Path(__file__).parent
 NODE = shutil.which("node")

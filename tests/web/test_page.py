@@ -16,8 +16,8 @@ import pytest
 
 from conformance.cases import find
 from proxyimg_codec.cli import decode
+from tests.support.paths import ROOT
 
-ROOT = Path(__file__).parents[2]
 HERE = Path(__file__).parent
 NODE = shutil.which("node")
 MODULES = HERE / "node_modules"

@@ -9,8 +9,8 @@ from proxyimg_codec.encoder.pyramid.picture import _view
 from proxyimg_codec.encoder.shapes.masks import Region, load_masks
 from proxyimg_codec.geometry.boundary import Boundary
 from proxyimg_codec.io import raster
-from tests.conftest import smooth
-from tests.edit.test_operations import grown
+from tests.support.edits import grown
+from tests.support.pictures import smooth
 
 FAST = {"texture": "pyramid", "effort": 1, "jobs": 1}
 

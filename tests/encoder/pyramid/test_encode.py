@@ -10,8 +10,10 @@ import torch
 from proxyimg_codec import encode, from_bytes
 from proxyimg_codec.encoder.pyramid import encode as pyramid
 from proxyimg_codec.encoder.pyramid import rate, refine
-from proxyimg_codec.encoder.pyramid.encode import Effort, Raster, Window
+from proxyimg_codec.encoder.pyramid.encode import Effort, Raster
 from proxyimg_codec.encoder.pyramid.load import load
+from proxyimg_codec.encoder.pyramid.shifts import SHIFTS
+from proxyimg_codec.encoder.pyramid.window import Window
 from proxyimg_codec.encoder.settings import Settings
 from proxyimg_codec.errors import UsageError
 from proxyimg_codec.render.quality import psnr
@@ -137,10 +139,10 @@ def test_shifts_take_the_fewest_bits():
             y_, mean, scale = (v[:, at, few, few] for v in (torch.round(y), *p))
             spent = {
                 s: rate.bits_of_integers(y_, mean, (scale + s / 8).clamp(-4, 3.875)).sum().item()
-                for s in pyramid.SHIFTS
+                for s in SHIFTS
             }
             chosen = best[2 * k + group]
-            for near in {chosen - 1, chosen + 1} & set(pyramid.SHIFTS):
+            for near in {chosen - 1, chosen + 1} & set(SHIFTS):
                 assert spent[chosen] <= spent[near] + 0.01
 
 

@@ -12,7 +12,8 @@ from proxyimg_codec.encoder.pyramid.model import LEVELS, Model, plain_synthesis
 from proxyimg_codec.encoder.pyramid.similarity import ms_ssim
 from proxyimg_codec.entropy import laplace
 from proxyimg_codec.texture import context, registered_model, synthesis
-from proxyimg_codec.texture.planes import Latents, encoded
+from proxyimg_codec.texture.latents import Latents
+from proxyimg_codec.texture.planes import encoded
 
 STEP = 300
 

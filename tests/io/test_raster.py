@@ -12,6 +12,7 @@ import pytest
 from proxyimg_codec.errors import InputError, UnsupportedError, UsageError
 from proxyimg_codec.io.metadata import is_cut_jpeg, raw_blocks, upright
 from proxyimg_codec.io.raster import encode_png, read, write
+from tests.support.pictures import icc
 
 oiio = pytest.importorskip("OpenImageIO")
 
@@ -28,14 +29,6 @@ def exif(orientation: int, order: str = "<") -> bytes:
     tags = [(0x0100, 3, 1, 7, 0), (0x0112, 3, 1, orientation, 0), (0x0128, 3, 1, 2, 0)]
     body = b"".join(struct.pack(order + "HHIHH", *t) for t in tags)
     return head + struct.pack(order + "IH", 8, len(tags)) + body + struct.pack(order + "I", 0)
-
-
-def icc(space: bytes = b"RGB ") -> bytes:
-    """A profile with one meaningless tag; libpng passes over what compresses to very little."""
-    d50 = struct.pack(">III", 0xF6D6, 0x10000, 0xD32D)
-    head = struct.pack(">I4sI4s4s4s", 544, b"none", 0x02000000, b"mntr", space, b"XYZ ")
-    head = (head.ljust(36, b"\0") + b"acsp").ljust(68, b"\0") + d50.ljust(60, b"\0")
-    return head + struct.pack(">I4sII", 1, b"cprt", 144, 400) + np.random.default_rng(0).bytes(400)
 
 
 def noise(channels: int, dtype: str = "uint8", height: int = 7, width: int = 11) -> np.ndarray:

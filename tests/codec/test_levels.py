@@ -1,12 +1,8 @@
 """Profiles and levels of files."""
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from conformance.cases import load
 from proxyimg_codec.codec.levels import COUNTED, LEVELS, PROFILES, profile_and_level

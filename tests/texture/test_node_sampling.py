@@ -3,7 +3,7 @@ import pytest
 
 from proxyimg_codec.geometry.boundary import Boundary
 from proxyimg_codec.texture import node_sampling as node
-from tests.texture.test_implicit import texture
+from tests.support.textures import texture
 
 BOX = (4, 2, 40, 25)
 NODES = np.array([[5.0, 3.0], [41.0, 6.0], [12.0, 26.0], [43.0, 24.0]])

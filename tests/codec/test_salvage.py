@@ -22,7 +22,7 @@ LEVELS = 3
 
 def built(cases, name):
     made = cases.CASES[name].build(Numbers(name))
-    return made if isinstance(made, bytes) else made.to_bytes()
+    return made if isinstance(made, bytes) else pxi.Image(made).to_bytes()
 
 
 @pytest.fixture(scope="module")

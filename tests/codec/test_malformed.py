@@ -4,7 +4,6 @@ A file is called CLASS-WHAT.pxi, after the class of the error that it ends in.
 """
 
 import tracemalloc
-from pathlib import Path
 
 import pytest
 
@@ -12,8 +11,9 @@ from proxyimg_codec import from_bytes
 from proxyimg_codec.errors import FormatError, LimitError, UnsupportedError
 from proxyimg_codec.validation.validate import validate
 from proxyimg_codec.validation.warnings import ERROR
+from tests.support.paths import TESTS
 
-FILES = sorted((Path(__file__).parent / "malformed").glob("*.pxi"))
+FILES = sorted((TESTS / "malformed").glob("*.pxi"))
 CLASSES = {"format": FormatError, "unsupported": UnsupportedError, "limit": LimitError}
 PEAK = 300 << 20
 

@@ -12,7 +12,7 @@ from proxyimg_codec.geometry.raster import rasterize
 from proxyimg_codec.io.samples import to_float
 from proxyimg_codec.render.compose import outline
 from proxyimg_codec.render.view import make_view
-from tests.conftest import disc, smooth
+from tests.support.pictures import disc, smooth
 
 
 def planned(settings, masks=True):

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from proxyimg_codec import from_bytes
-from proxyimg_codec.animate.animate import animate, preset
+from proxyimg_codec.animate.animate import preset
 from proxyimg_codec.animate.coupling import touching
 from proxyimg_codec.geometry.pose import REST
 from proxyimg_codec.geometry.warp import barycentric
-from tests.pyramids import cut_picture
 from tests.support.images import changed
+from tests.support.pyramids import cut_picture
 
 
 @pytest.fixture
@@ -50,7 +50,7 @@ def displacement(layer, point, t, timeline):
 
 
 def test_layers_that_touch_do_not_tear(picture):
-    moving = animate(picture, preset(picture, "sway", duration=1.0))
+    moving = picture.animated(preset(picture, "sway", duration=1.0))
     one, two = (v for v in moving.layers if v.track)
     assert one.track.body == two.track.body
     # The disc stands on the bar there.
@@ -60,12 +60,12 @@ def test_layers_that_touch_do_not_tear(picture):
     assert max(np.hypot(*displacement(two, (32, 12), k / 8, moving.timeline)) for k in range(8)) > 1
     # What the bar and the disc share stays; what either shares with the back, which rests, goes.
     assert len(moving.layers[1].texture.cuts.fronts) == 1
-    assert not moving.at(0.4).layers[1].apart.fronts
-    assert len(moving.at(0.4).layers[0].apart.fronts) == 2
+    assert not moving.at(0.4).layers[1].moved_neighbours.fronts
+    assert len(moving.at(0.4).layers[0].moved_neighbours.fronts) == 2
 
 
 def test_separate_layers_have_bodies_of_their_own(picture):
-    moving = animate(picture, preset(picture, "sway", duration=1.0, together=False))
+    moving = picture.animated(preset(picture, "sway", duration=1.0, together=False))
     one, two = (v for v in moving.layers if v.track)
     assert one.track.body != two.track.body
     again = from_bytes(moving.to_bytes())

@@ -2,7 +2,6 @@
 
 import zlib
 from itertools import chain
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,8 +10,8 @@ from proxyimg_codec import from_bytes
 from proxyimg_codec.container.chunks import READABLE, read, write
 from proxyimg_codec.errors import FormatError, PxiError
 from proxyimg_codec.validation.validate import validate
+from tests.support.paths import ROOT
 
-ROOT = Path(__file__).parents[1]
 FILES = {
     "example": ROOT / "spec" / "example.pxi",
     "moves-posed": ROOT / "conformance" / "cases" / "motion" / "moves-posed" / "input.pxi",
@@ -72,6 +71,7 @@ def test_a_flipped_bit_is_noticed_wherever_it_is(data):
         assert np.array_equal(shown(flipped(data, bit)), shown(data))
 
 
+@pytest.mark.slow
 def test_what_a_crc_does_not_notice_is_refused_or_drawn(data):
     """Bits of payloads, each with the right CRC."""
     chunks = read(data)

@@ -9,7 +9,7 @@ from proxyimg_codec.errors import InputError, UnsupportedError, UsageError
 from proxyimg_codec.geometry.boundary import Boundary
 from proxyimg_codec.geometry.mesher import delaunay, fill, rim, sound
 from proxyimg_codec.geometry.outline import outline
-from tests.geometry.test_mesher import SHAPES, check, lengths, spare
+from tests.support.meshes import SHAPES, check, lengths, spare
 
 RING = Boundary(2, tuple(SHAPES["ring"]))
 SIZE = (400, 400)

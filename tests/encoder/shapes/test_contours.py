@@ -1,7 +1,6 @@
 """Tests of crack tracing and of both boundary fits."""
 
 import itertools
-import pathlib
 import time
 
 import numpy as np
@@ -13,7 +12,6 @@ from proxyimg_codec.encoder.shapes.chamfer import fit_paths_chamfer
 from proxyimg_codec.encoder.shapes.contours import fit_paths, trace
 from proxyimg_codec.encoder.shapes.paths import faults, flatten
 
-MASKS = pathlib.Path(__file__).parents[3] / "shared" / "data" / "kodak_masks"
 Y, X = np.mgrid[:96, :128]
 
 
@@ -318,12 +316,11 @@ def test_chamfer_is_repaired():
     check(mask, fit_paths_chamfer(mask, iterations=3))
 
 
-@pytest.mark.skipif(not MASKS.is_dir(), reason="the shared Kodak masks are not here")
 @pytest.mark.parametrize("name", ["kodim05", "kodim23"])
-def test_real_masks(name):
+def test_real_masks(data_dir, name):
     import cv2
 
-    labels = cv2.imread(str(MASKS / f"{name}.png"), cv2.IMREAD_UNCHANGED)
+    labels = cv2.imread(str(data_dir / "kodak_masks" / f"{name}.png"), cv2.IMREAD_UNCHANGED)
     paths = fit_paths(labels == 1)
     assert len(paths) == len(trace(labels == 1))
     assert iou(labels == 1, paths) > 0.995

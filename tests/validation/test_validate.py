@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -16,10 +15,10 @@ from proxyimg_codec.geometry import deltas
 from proxyimg_codec.limits import Limits
 from proxyimg_codec.model import Layers
 from proxyimg_codec.validation import validate, warnings
-from tests import moving, pyramids
+from tests.support import moving, pyramids
 from tests.support.images import changed
+from tests.support.paths import ROOT
 
-ROOT = Path(__file__).parents[1]
 CASES = load()
 CLASSES = {"invalid": FormatError, "unsupported": UnsupportedError, "limit": LimitError}
 RULE = r"[A-Z]{3}-\d+"
@@ -336,7 +335,7 @@ def test_folded_meshes():
     flipped = -2 * (nodes - nodes.mean(0).astype(int))[:, 0] >> 6
     swapped = zero.nodes if zero.nodes is not None else 0 * nodes
     swapped[:, 0] = flipped
-    layers = [changed(v, pose=replace(zero, nodes=swapped if v is disc else None, sway=None))
+    layers = [changed(v, pose=replace(zero, nodes=swapped if v == disc else None, sway=None))
               for v in image.layers]  # fmt: skip
     folded = changed(image, layers=Layers(layers))
     assert odd(folded) == ["VAL-9"]

@@ -5,16 +5,12 @@ from proxyimg_codec.encoder.implicit import fit
 from proxyimg_codec.encoder.implicit.fit_native import NativeTrainer
 from proxyimg_codec.encoder.implicit.fit_problem import build
 from proxyimg_codec.encoder.implicit.fit_torch import TorchTrainer
-from proxyimg_codec.geometry.boundary import Boundary
+from proxyimg_codec.encoder.implicit.state import best_steps, quantize
 from proxyimg_codec.native import kernel
 from proxyimg_codec.texture.network import NetShape
+from tests.support.meshes import square
 
 needs_kernel = pytest.mark.skipif(not kernel.available(), reason="the kernel was not compiled")
-
-
-def square(x0, y0, x1, y1):
-    corners = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
-    return Boundary(2, (np.repeat(corners * 4, 3, axis=0) + np.array([2, 1]),))
 
 
 def problem(channels=3, size=32, octaves=2):
@@ -77,7 +73,7 @@ def test_training_lowers_the_loss_in_two_phases(trainer, monkeypatch):
     p = problem(octaves=4)
     state = fit.fit(p, 240, 4, 8, seed=0)
     top = 1 << 3
-    codes = fit.quantize(state.codes, state.code_steps[0], 4)
+    codes = quantize(state.codes, state.code_steps[0], 4)
     assert codes.min() >= -top
     assert codes.max() <= top - 1
     _, loss = (None, fit.make_trainer(p, "cpu", 1).run(
@@ -87,9 +83,9 @@ def test_training_lowers_the_loss_in_two_phases(trainer, monkeypatch):
 
 def test_best_steps_minimize_the_error():
     values = np.random.default_rng(0).normal(0, 1, (3, 500)).astype(np.float32)
-    steps = fit.best_steps(values, 4)
+    steps = best_steps(values, 4)
     error = [
-        ((fit.quantize(values, s[:, None], 4) * s[:, None] - values) ** 2).sum()
+        ((quantize(values, s[:, None], 4) * s[:, None] - values) ** 2).sum()
         for s in (steps, 1.3 * steps, 0.75 * steps, np.abs(values).max(1) / 7)
     ]
     assert error[0] == min(error)
@@ -97,7 +93,7 @@ def test_best_steps_minimize_the_error():
 
 def test_quantize_clamps_and_rounds_half_to_even():
     values = np.array([-9.0, -8.4, 0.5, 1.5, 7.4, 99.0], np.float32)
-    assert fit.quantize(values, np.float32(1), 4).tolist() == [-8, -8, 0, 2, 7, 7]
+    assert quantize(values, np.float32(1), 4).tolist() == [-8, -8, 0, 2, 7, 7]
 
 
 def test_cost_a_pixel_does_not_grow():

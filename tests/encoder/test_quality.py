@@ -1,7 +1,5 @@
 """Quality and size on a part of a real photograph: what a change of the encoder may not lose."""
 
-from pathlib import Path
-
 import cv2
 import numpy as np
 import pytest
@@ -9,9 +7,10 @@ import pytest
 import proxyimg_codec as pxi
 from proxyimg_codec.io import raster
 from proxyimg_codec.render.quality import psnr
+from tests.support.paths import ROOT
 
 PSNR, BYTES = 29.4, 6600
-PHOTO = Path(__file__).parents[1] / "docs" / "images" / "photo.png"
+PHOTO = ROOT / "docs" / "images" / "photo.png"
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from proxyimg_codec.api import Image
 from proxyimg_codec.geometry.mesher import derived
 from proxyimg_codec.geometry.track import Timeline
 from proxyimg_codec.model import Layers
-from tests import pyramids
+from tests.support import pyramids
 
 LOOP = Timeline(1500, 8, True, 5, 2, '{"version": 1, "preset": "sway"}\n')
 ONCE = replace(LOOP, loop=False, script="")

@@ -2,9 +2,6 @@ import copy
 
 import numpy as np
 import pytest
-
-pytest.importorskip("torch")
-
 import torch
 
 import proxyimg_codec as pxi
@@ -14,6 +11,7 @@ from proxyimg_codec.encoder.implicit import fit, fit_node, node_problem
 from proxyimg_codec.encoder.implicit.fit_problem import build
 from proxyimg_codec.encoder.implicit.node_problem import NodeOptions
 from proxyimg_codec.encoder.implicit.rounding import Choice
+from proxyimg_codec.encoder.implicit.state import State, quantize, rows_of
 from proxyimg_codec.encoder.settings import Settings
 from proxyimg_codec.encoder.shapes.layers import LayerPlan, Plan
 from proxyimg_codec.encoder.shapes.masks import Region
@@ -23,8 +21,8 @@ from proxyimg_codec.geometry.mesh import FRACTION_BITS
 from proxyimg_codec.render.quality import psnr
 from proxyimg_codec.texture import node_sampling as decoder
 from proxyimg_codec.texture.network import NetShape
-from tests.conftest import disc, smooth
-from tests.encoder.test_fit import square
+from tests.support.meshes import square
+from tests.support.pictures import disc, smooth
 
 WIDTH, HEIGHT = 48, 40
 
@@ -74,7 +72,7 @@ def test_training_and_decoding_see_the_same_features(options):
     trainer = fit_node.NodeTrainer(p, "cpu")
     plane = np.repeat([0, 1], [v.size for v in p.planes])
     steps = state.code_steps[plane]
-    codes = torch.from_numpy(fit.quantize(state.codes, steps, 6) * steps)
+    codes = torch.from_numpy(quantize(state.codes, steps, 6) * steps)
     for k, layer in enumerate(layers):
         at = np.flatnonzero(p.layer == k)
         got = trainer.features(codes, torch.from_numpy(at)).numpy()
@@ -152,7 +150,7 @@ def test_choices_are_between_neighbours():
 
 def error_of(p, state):
     """Mean squared error of all pixels."""
-    still = fit.State(state.codes, state.weights, state.code_steps, state.row_steps)
+    still = State(state.codes, state.weights, state.code_steps, state.row_steps)
     pixels = np.arange(p.pixels, dtype=np.int32)[None]
     none = np.zeros(1, np.float32)
     return fit_node.NodeTrainer(p, "cpu").run(still, pixels, none, none)
@@ -163,11 +161,11 @@ def nearest(p, state, bits):
     out = copy.deepcopy(state)
     fit.choose_steps(p, out, bits, bits)
     steps = out.code_steps[np.repeat([0, 1], [v.size for v in p.planes])]
-    out.codes[:] = fit.quantize(out.codes, steps, bits) * steps
+    out.codes[:] = quantize(out.codes, steps, bits) * steps
     ends = np.cumsum([o for _, o in p.shape.layers])[:-1]
-    rows = fit.rows_of(p.shape, out.weights)
+    rows = rows_of(p.shape, out.weights)
     for (w, _), s in zip(rows, np.split(out.row_steps, ends), strict=True):
-        w[:] = fit.quantize(w, s[:, None], bits) * s[:, None]
+        w[:] = quantize(w, s[:, None], bits) * s[:, None]
     return out
 
 

@@ -1,14 +1,10 @@
 """The built-in decomposition: partition, order, limits, and plain pictures done right."""
 
-from pathlib import Path
-
 import cv2
 import numpy as np
 import pytest
 
 from proxyimg_codec.encoder.shapes.segment import segment
-
-DATA = Path(__file__).parents[3] / "shared" / "data"
 
 
 def disc(height: int, width: int, y: float, x: float, radius: float) -> np.ndarray:
@@ -180,11 +176,10 @@ def test_thin_and_empty_supports():
     assert_partition(segment(rgb, support=line), line)
 
 
-@pytest.mark.skipif(not (DATA / "kodak").is_dir(), reason="the shared test pictures are absent")
 @pytest.mark.parametrize(("name", "least"), [("kodim02", 0.85), ("kodim15", 0.9), ("kodim12", 0.7)])
-def test_objects_in_photographs(name, least):
-    bgr = cv2.imread(str(DATA / "kodak" / f"{name}.png"))
-    truth = cv2.imread(str(DATA / "kodak_masks" / f"{name}.png"), cv2.IMREAD_UNCHANGED) > 0
+def test_objects_in_photographs(data_dir, name, least):
+    bgr = cv2.imread(str(data_dir / "kodak" / f"{name}.png"))
+    truth = cv2.imread(str(data_dir / "kodak_masks" / f"{name}.png"), cv2.IMREAD_UNCHANGED) > 0
     regions = segment(np.ascontiguousarray(bgr[..., ::-1]))
     assert_partition(regions, np.ones(truth.shape))
     inside = [r.mask for r in regions if (r.mask & truth).sum() * 2 > r.mask.sum()]
