@@ -2,7 +2,8 @@
 
 The layers of a pyramid picture are views of one raster. A view knows the boundaries that cut it
 when it was made (`texture.occlusion`). The raster samples on such a boundary are mixtures of the
-colours on both sides. They no longer fit once an edit has moved the boundary away or removed its layer.
+colours on both sides. They no longer fit once an edit has moved the boundary away or removed its
+layer.
 """
 
 from __future__ import annotations
