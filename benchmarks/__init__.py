@@ -1,1 +1,1 @@
-"""Slow measurements; docs/figures.md has what they printed, and the commands."""
+"""Slow measurements; docs/figures.md has their results, and the commands."""

@@ -3,8 +3,8 @@
     python -m benchmarks.animation DATA [--only speed loops stored export flow features]
 
 DATA holds the Kodak pictures, their label maps and the emoji. The scene is the middle 512 x 512 of
-kodim23, with its two objects and an emoji in front of it as layers that move. Times are wall times,
-the least of several runs, as two threads are to be compared with one.
+kodim23. Its two objects, and an emoji in front of them, are layers that move. Times are wall times,
+so that one thread and two can be compared: the least of several runs.
 """
 
 from __future__ import annotations
@@ -38,20 +38,20 @@ from proxyimg_codec.native import kernel
 
 EMOJI = "emoji_fluent3d_1f98a.webp"
 SIDE, CORNER = 240, (136, 264)
-"""Size of the emoji in pixels, and where its corner is: x, y."""
+"""Side of the emoji, and x, y of its corner, in pixels."""
 
 EDGE = 0.028
-"""Length of the edges of the meshes, relative to the diagonal of a layer."""
+"""Edge length of the meshes, relative to the diagonal of a layer."""
 
 SECONDS, FPS, RUNS = 4.0, 24, 3
 FLAGS = ("--preset", "breeze", "--separate", "--quiet")
 KINDS = ("mp4", "webm", "webp", "gif", "apng")
 MUST = {("implicit", "numpy"): 4, ("implicit", "native"): 15, ("pyramid", "native"): 20}
-"""Frames a second to be reached on two threads."""
+"""Frames per second that each coder and engine must reach on two threads."""
 
 
 def scene(data: Path) -> tuple[Pixels, list[Region]]:
-    """The picture, and its three layers."""
+    """Makes the picture, uint8 [512, 512, 3], and its three layers."""
     import cv2
 
     pixels, masks = regions(data, PICTURE)
@@ -66,7 +66,7 @@ def scene(data: Path) -> tuple[Pixels, list[Region]]:
 
 
 def encoded(data: Path, texture: str) -> Image:
-    """The scene as a picture, with meshes of the same fineness whatever the coder."""
+    """Encodes the scene, with meshes that are the same for every coder."""
     pixels, masks = scene(data)
     picture = pxi.encode(pixels, masks=masks, texture=texture, effort=2, mesh="none").picture
     back, *fronts = picture.layers
@@ -75,13 +75,16 @@ def encoded(data: Path, texture: str) -> Image:
 
 
 def moving(image: Image, name: str, progress: Callable[[int, int], None] | None = None) -> Image:
-    """The picture with a preset of four seconds, each layer a body of its own."""
+    """Gives a picture the motion of a preset, with each layer as a body of its own."""
     motion = preset(image, name, together=False, duration=SECONDS, fps=FPS)
     return image.animated(motion, progress=progress)
 
 
 def speed(paths: dict[str, Path]) -> None:
-    """Frames a second by stage, each engine and number of threads in a process of its own."""
+    """Prints frames per second and times by stage, for each engine and number of threads.
+
+    Each of these runs in a process of its own.
+    """
     print(
         f"frames a second, {SECONDS:g} s of breeze at {FPS}; ms a frame by stage, on one thread: "
         "simulation, fit of tracks, tracks and outlines, back layer, moving layers, MP4"
@@ -92,7 +95,7 @@ def speed(paths: dict[str, Path]) -> None:
             for threads in (1, 2):
                 call = f"time_frames({str(path)!r}, {engine!r}, {threads})"
                 code = f"from benchmarks.animation import time_frames; {call}"
-                # With two, numpy's own threads are as any user has them.
+                # With two threads, those of numpy are left at their default, as users have them.
                 said = run_limited(code, threads=1 if threads == 1 else None)[0]
                 must = MUST.get((texture, engine)) if threads == 2 else None
                 note = f"  (must reach {must})" if must else ""
@@ -100,7 +103,7 @@ def speed(paths: dict[str, Path]) -> None:
 
 
 def time_frames(path: str, engine: str, threads: int) -> None:
-    """Prints the times of one engine; runs in a process of its own."""
+    """Prints the times of one engine; `speed` runs this in a process of its own."""
     image = pxi.open(path)
     start = time.perf_counter()
     image.render(engine=engine)
@@ -117,7 +120,7 @@ def time_frames(path: str, engine: str, threads: int) -> None:
 
 
 def _stages(moved: Image, at: list[float], engine: str) -> list[float]:
-    """Seconds a frame: tracks and outlines, back layer, moving layers, MP4."""
+    """Seconds per frame: tracks and outlines, back layer, moving layers, MP4."""
     few = at[:: len(at) // 16]
 
     def placed() -> None:
@@ -135,7 +138,7 @@ def _stages(moved: Image, at: list[float], engine: str) -> list[float]:
 
 
 def _least(work: Callable[[], object]) -> float:
-    """Seconds that some work takes: the least of some runs."""
+    """Seconds that some work takes: the least of `RUNS` runs."""
     spent = []
     for _ in range(RUNS):
         start = time.perf_counter()
@@ -145,7 +148,7 @@ def _least(work: Callable[[], object]) -> float:
 
 
 def _animated(image: Image) -> tuple[float, float, Image]:
-    """Seconds of the simulation and of fitting tracks, and the picture that moves."""
+    """Animates a picture; returns seconds of simulation and of fitting tracks, and the result."""
     start = done = time.perf_counter()
 
     def progress(now: int, total: int) -> None:
@@ -157,7 +160,7 @@ def _animated(image: Image) -> tuple[float, float, Image]:
 
 
 def _clip(shown: list[NDArray[np.uint8]], kind: str) -> int:
-    """Bytes of a clip of frames."""
+    """Writes frames as a clip, and returns its bytes."""
     height, width = shown[0].shape[:2]
     with tempfile.TemporaryDirectory() as folder:
         path = str(Path(folder) / f"clip.{kind}")
@@ -165,7 +168,7 @@ def _clip(shown: list[NDArray[np.uint8]], kind: str) -> int:
 
 
 def loops(image: Image) -> Iterator[str]:
-    """Whether a loop closes, and whether its seam shows, for each preset."""
+    """Yields lines on the seam of the loop, for each preset."""
     yield (
         "loops: frame at the end less frame at the beginning, most in 8-bit levels; RMS step over "
         "the seam, relative to the largest of other steps; displacement of nodes, mean in px"
@@ -181,7 +184,7 @@ def loops(image: Image) -> Iterator[str]:
 
 
 def stored(image: Image) -> Iterator[str]:
-    """What a motion adds to a file, for each preset."""
+    """Yields lines on the bytes that a motion adds to a file, for each preset."""
     yield f"stored motion of {SECONDS:g} s in bytes (at most 30000): chunk mOTN, and with meshes"
     picture = image.picture
     bare = Layers(replace(v, mesh=None) for v in picture.layers)
@@ -193,7 +196,7 @@ def stored(image: Image) -> Iterator[str]:
 
 
 def export(paths: dict[str, Path]) -> Iterator[str]:
-    """Seconds of a clip by the command line's function: simulated, rendered and written."""
+    """Yields lines on the seconds that ``pxi-animate`` takes to make a clip, and on its bytes."""
     from proxyimg_codec.cli.animate import main as command
 
     yield f"pxi-animate {' '.join(FLAGS)}, {SECONDS:g} s, 512x512: seconds (at most 30), bytes"
@@ -209,7 +212,7 @@ def export(paths: dict[str, Path]) -> Iterator[str]:
 
 
 def main() -> None:
-    """Entry point."""
+    """Runs the command line."""
     sections = ("speed", "loops", "stored", "export", "flow", "features")
     p = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     p.add_argument("data", type=Path)

@@ -2,11 +2,11 @@
 
     python -m benchmarks.background DATA [--count N] [--seed S] [--effort E] [--pictures DIR]
 
-A sprite with true alpha is pasted on a photograph, the composite encoded with the true mask, and
-the object removed; what was hidden is compared with the photograph: over the hole (the pixels that
-the object covers, also in part), and in the band of 6 px inside its rim. Beside it OpenCV's
-inpainting, radius 3, of the decoded composite, with 1 px more than the hole to fill in.
-The method was made by looking at seed 0; other seeds, with other sprites in other places, confirm.
+A sprite with true alpha is pasted on a photograph. The composite is encoded with the true mask, and
+the object is removed. Then the part that it hid is compared with the photograph, over the hole (all
+pixels that the object covers, also in part) and in the band of 6 px inside its rim. For comparison,
+OpenCV inpaints the decoded composite with radius 3, in the hole and 1 px around it. The method was
+developed on seed 0; other seeds, with other sprites in other places, confirm it.
 """
 
 from __future__ import annotations
@@ -37,7 +37,10 @@ Scores = dict[str, list[tuple[float, float]]]
 
 
 def sprites(data: Path) -> Iterator[tuple[str, Pixels]]:
-    """Name and RGBA of sprites that cover a fifth of their picture or more, kind after kind."""
+    """Yields name and RGBA [H, W, 4] of sprites, of each kind in turn.
+
+    Sprites that cover less than a fifth of their picture are left out.
+    """
     kinds = [sorted(data.glob(pattern)) for pattern in SPRITES]
     for path in (p for row in zip_longest(*kinds) for p in row if p is not None):
         pixels = raster.read(path).pixels
@@ -46,7 +49,16 @@ def sprites(data: Path) -> Iterator[tuple[str, Pixels]]:
 
 
 def composite(photo: Pixels, sprite: Pixels, seed: int) -> tuple[Pixels, Pixels, NDArray[np.bool_]]:
-    """The photograph, the composite and the true mask, all WIDTH x HEIGHT."""
+    """Pastes a sprite on the middle of a photograph.
+
+    Args:
+        photo: uint8 [H, W, 3] photograph.
+        sprite: uint8 [h, w, 4] sprite with straight alpha.
+        seed: Seed of the size and place of the sprite.
+
+    Returns:
+        Photograph and composite, uint8 [HEIGHT, WIDTH, 3], and mask, bool [HEIGHT, WIDTH].
+    """
     rng = np.random.default_rng(seed)
     y, x = (photo.shape[0] - HEIGHT) // 2, (photo.shape[1] - WIDTH) // 2
     photo = np.ascontiguousarray(photo[y : y + HEIGHT, x : x + WIDTH])
@@ -64,7 +76,14 @@ def composite(photo: Pixels, sprite: Pixels, seed: int) -> tuple[Pixels, Pixels,
 
 
 def completions(images: dict[str, Image]) -> tuple[NDArray[np.bool_], dict[str, Pixels]]:
-    """The hole, and the picture without the object by each method."""
+    """Removes the object by each method.
+
+    Args:
+        images: The encoded composite, by kind of background.
+
+    Returns:
+        bool [HEIGHT, WIDTH] hole, and the picture without the object by the name of the method.
+    """
     image = images[OURS[0]]
     hole = image.render(layers=["object"], dtype=np.float32)[..., 3] > 0
     wide = cv2.dilate(hole.astype(np.uint8), np.ones((3, 3), np.uint8))
@@ -76,13 +95,13 @@ def completions(images: dict[str, Image]) -> tuple[NDArray[np.bool_], dict[str, 
 
 
 def psnr(photo: Pixels, filled: Pixels, where: NDArray[np.bool_]) -> float:
-    """PSNR over the chosen pixels."""
+    """PSNR in dB of pictures in 0..255 over the pixels `where`, bool [H, W]."""
     error = (photo[where].astype(np.float64) - filled[where]) ** 2
     return float(10 * np.log10(255**2 / max(float(error.mean()), 1e-6)))
 
 
 def report(scores: Scores, sizes: dict[str, list[int]]) -> None:
-    """Prints means, and how the default does against the better inpainting."""
+    """Prints means, and compares the default with the better inpainting."""
     means = {name: np.mean(values, axis=0) for name, values in scores.items()}
     print(f"mean of {len(scores[OURS[0]])} composites")
     for name, (hole, band) in means.items():
@@ -102,7 +121,15 @@ def report(scores: Scores, sizes: dict[str, list[int]]) -> None:
 def run(
     data: Path, count: int = 24, seed: int = 0, effort: int = 4, folder: Path | None = None
 ) -> None:
-    """Makes, encodes and completes composites, and prints the scores; pictures go to `folder`."""
+    """Makes, encodes and completes composites, and prints the scores.
+
+    Args:
+        data: Folder with ``kodak/`` and the folders of sprites.
+        count: Number of composites, at most 24.
+        seed: Seed that chooses sprites and their places.
+        effort: Effort of the encoder, 1..9.
+        folder: Folder for pictures of the results, or None.
+    """
     if folder:
         folder.mkdir(parents=True, exist_ok=True)
     scores: Scores = {}
@@ -131,7 +158,7 @@ def run(
 
 
 def main() -> None:
-    """Entry point."""
+    """Runs the command line."""
     p = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     p.add_argument("data", type=Path, help="folder with kodak, clipart, emoji and anime")
     p.add_argument("--count", type=int, default=24, help="composites, at most 24")

@@ -1,4 +1,4 @@
-"""What the benchmarks share: pictures, crops, and saying what was run on what."""
+"""Helpers of all benchmarks: pictures, crops, child processes, and a header of the output."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Pixels = NDArray[Any]
 
 
 def header(data: Path) -> str:
-    """Command, versions, data and machine."""
+    """Line with the command, versions, the name of the data folder, and the machine."""
     parts = [f"$ python -m {Path(sys.argv[0]).parent.name}.{Path(sys.argv[0]).stem} "
              + " ".join(sys.argv[1:])]  # fmt: skip
     for name in ("proxyimg-codec", "numpy", "torch", "onnxruntime"):
@@ -33,7 +33,7 @@ def header(data: Path) -> str:
 
 
 def kodak(data: Path) -> list[Path]:
-    """The 24 pictures, sorted."""
+    """Paths of the 24 Kodak pictures, sorted; exits if there are not 24 in ``kodak/``."""
     files = sorted((data / "kodak").glob("kodim*.png"))
     if len(files) != 24:
         sys.exit(f"{data / 'kodak'}: expected kodim01.png .. kodim24.png")
@@ -41,18 +41,26 @@ def kodak(data: Path) -> list[Path]:
 
 
 def read_rgb(path: Path) -> Pixels:
-    """uint8 [H, W, 3]."""
+    """Reads a picture file as RGB, uint8 or uint16 [H, W, 3]."""
     return np.ascontiguousarray(raster.read(path).pixels[..., :3])
 
 
 def centre_crop(pixels: Pixels, size: int = 512) -> Pixels:
-    """The central size x size part."""
+    """Central part [size, size, C] of a picture [H, W, C]."""
     y, x = ((n - size) // 2 for n in pixels.shape[:2])
     return np.ascontiguousarray(pixels[y : y + size, x : x + size])
 
 
 def run_limited(code: str, threads: int | None = None) -> tuple[str, float, float]:
-    """Runs Python code in a child; its output, peak memory in GB, and CPU seconds."""
+    """Runs Python code in another process.
+
+    Args:
+        code: The code.
+        threads: Number of threads for numpy; None leaves it to numpy.
+
+    Returns:
+        Standard output, peak memory in GB, and CPU seconds.
+    """
     import os
 
     env = dict(os.environ)

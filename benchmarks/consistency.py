@@ -1,6 +1,6 @@
-"""How steady the frames of a picture that moves are: along its flow, and in features of gradients.
+"""Consistency of the frames of an animation: along its flow, and in features of gradients.
 
-A part of `benchmarks.animation`.
+This is a part of `benchmarks.animation`.
 """
 
 from __future__ import annotations
@@ -27,30 +27,32 @@ Real = NDArray[np.float64]
 Moving = Callable[[Image, str], Image]
 
 MARGIN = 2
-"""Pixels round outlines that are left out."""
+"""Distance from outlines, in pixels, within which pixels are left out."""
 
 ENLARGED = 4
-"""Samples a pixel, across and down, that frames are warped from, so that interpolation is near
-enough exact."""
+"""Samples per pixel, across and down, of the frames that are warped; so many that interpolation is
+almost exact."""
 
 PAIRS = 7
 """Pairs of consecutive frames, spread over the clip."""
 
 NOWHERE = -1
+"""Label of pixels near outlines."""
 
 SCALES = 3
+"""Scales at which features are compared, each half as large as the one before."""
 
 CROSS = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
 DISC = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * MARGIN + 1, 2 * MARGIN + 1))
 
 
 def rms(values: NDArray[Any]) -> float:
-    """Root mean square."""
+    """Root mean square of values; 0 for an empty array."""
     return float(np.sqrt((values.astype(np.float64) ** 2).mean())) if values.size else 0.0
 
 
 def labels(image: Image, view: View) -> NDArray[np.int64]:
-    """The layer [H, W] seen at each pixel of a still, or `NOWHERE` within `MARGIN` of outlines."""
+    """Layer that each pixel of a still shows, int64 [H, W]; `NOWHERE` near outlines."""
     seen = np.zeros((view.height, view.width), np.int64)
     near = np.zeros(seen.shape, np.uint8)
     for number, layer in enumerate(image.layers):
@@ -59,7 +61,7 @@ def labels(image: Image, view: View) -> NDArray[np.int64]:
             continue
         covered = cover.coverage(paths, 0, 0, view.width, view.height)
         seen[covered > 0] = number
-        # The rim of what is covered in full: outlines may lie on the edges of pixels.
+        # The rim of the fully covered pixels counts too, as outlines may lie on edges of pixels.
         full = (covered == cover.FULL).astype(np.uint8)
         near |= np.asarray(cv2.morphologyEx(full, cv2.MORPH_GRADIENT, CROSS), np.uint8)
         near |= ((covered > 0) & (covered < cover.FULL)).astype(np.uint8)
@@ -67,16 +69,16 @@ def labels(image: Image, view: View) -> NDArray[np.int64]:
 
 
 def origins(before: Image, after: Image, seen: NDArray[np.int64], view: View) -> Real:
-    """Where the point of the texture that a pixel of one still shows was in the still before.
+    """Canvas points, in an earlier still, of the texture points that a later still shows.
 
     Args:
-        before: A still.
-        after: A later one of the same picture.
-        seen: The layer [H, W] that `after` shows, or `NOWHERE`.
-        view: Of the whole canvas.
+        before: The earlier still.
+        after: The later still of the same picture.
+        seen: int64 [H, W] layer that each pixel of `after` shows, or `NOWHERE`.
+        view: View of the whole canvas.
 
     Returns:
-        float64 [H, W, 2] canvas points x, y; nan where no layer that has a mesh is seen.
+        float64 [H, W, 2] x, y; NaN for pixels that show no layer with a mesh.
     """
     out = np.full((*seen.shape, 2), np.nan)
     box = (0, 0, view.width, view.height)
@@ -97,7 +99,16 @@ def origins(before: Image, after: Image, seen: NDArray[np.int64], view: View) ->
 
 
 def warped(picture: NDArray[np.float32], points: Real, scale: int) -> NDArray[np.float32]:
-    """Colours [H, W, 3] of a picture at canvas points [H, W, 2]; `scale` samples are a pixel."""
+    """Samples a picture at canvas points.
+
+    Args:
+        picture: float32 [h, w, 3] picture.
+        points: float64 [H, W, 2] x, y in canvas pixels; NaN counts as 0.
+        scale: Samples of the picture per canvas pixel.
+
+    Returns:
+        float32 [H, W, 3].
+    """
     at = np.nan_to_num(points * scale - 0.5, nan=0.0).astype(np.float32)
     x, y = np.ascontiguousarray(at[..., 0]), np.ascontiguousarray(at[..., 1])
     border = cv2.BORDER_REPLICATE
@@ -105,12 +116,12 @@ def warped(picture: NDArray[np.float32], points: Real, scale: int) -> NDArray[np
 
 
 def pair(before: Image, after: Image) -> list[float]:
-    """Sums over the pixels of two stills that show the same point of the same moving layer.
+    """Compares two stills at pixels that show the same point of the same moving layer.
 
     Returns:
-        Their number; the squared differences in 8-bit levels, mean over channels, along the flow
-        from enlarged frames, along it from frames as they are, and of standing still; the
-        displacements in pixels.
+        The number of these pixels; sums over them of squared differences in 8-bit levels (mean over
+        channels) along the flow from enlarged frames, along the flow from frames as they are, and
+        without flow; and the sum of displacements in pixels.
     """
     view = make_view((after.width, after.height))
     then, now = labels(before, view), labels(after, view)
@@ -133,7 +144,12 @@ def pair(before: Image, after: Image) -> list[float]:
 
 
 def flow(images: dict[str, Image], moving: Moving) -> Iterator[str]:
-    """Temporal consistency, for each coder and preset."""
+    """Yields lines on temporal consistency, for each coder and preset.
+
+    Args:
+        images: A picture by each coder.
+        moving: Gives a picture the motion of a preset.
+    """
     yield (
         f"flow: RMS difference of consecutive frames in 8-bit levels, {MARGIN} px within moving "
         f"layers, {PAIRS} pairs: warped along the known flow from frames of {ENLARGED}x, from "
@@ -157,10 +173,11 @@ def flow(images: dict[str, Image], moving: Moving) -> Iterator[str]:
 
 
 def hog(pixels: Pixels) -> list[NDArray[np.float32]]:
-    """Histograms of oriented gradients (Dalal, Triggs 2005), at each scale a unit vector.
+    """Histograms of oriented gradients (Dalal, Triggs 2005): a unit vector at each scale.
 
-    Cells of 8 samples with 9 orientations, in blocks of 2 x 2 cells with OpenCV's normalization, of
-    grey pictures of full, half and quarter size, whose sides are multiples of 8.
+    Cells have 8 samples a side and 9 orientations, in blocks of 2 x 2 cells with the normalization
+    of OpenCV. They are found in grey at full, half and quarter size, whose sides must be multiples
+    of 8.
     """
     grey = cv2.cvtColor(pixels, cv2.COLOR_RGB2GRAY)
     found = []
@@ -173,12 +190,15 @@ def hog(pixels: Pixels) -> list[NDArray[np.float32]]:
 
 
 def distance(one: Pixels, other: Pixels) -> Real:
-    """Distances of two pictures at each scale: 0 to the square root of 2."""
+    """Distances of the features of two pictures at each scale, float64 [SCALES] in 0..sqrt(2)."""
     return np.array([np.linalg.norm(a - b) for a, b in zip(hog(one), hog(other), strict=True)])
 
 
 def features(images: dict[str, Image], moving: Moving, data: Path) -> Iterator[str]:
-    """Distance of frames from the still, for each preset; beside it, that of other pictures."""
+    """Yields lines on the distance of frames from the still, for each preset.
+
+    For comparison, the first lines have the distance of other pictures.
+    """
     yield (
         "features: HOG distance of frames from the still, mean in cells of 8, 16 and 32 px "
         "(histograms of oriented gradients; not a learned metric: the weights of LPIPS, CLIP or "

@@ -2,10 +2,12 @@
 
     OMP_NUM_THREADS=1 python -m benchmarks.deform [DATA] [--nodes N] [--amount A]
 
-Meshes are jittered lattices inside four silhouettes, and inside the alpha of three cliparts where
-DATA is given. Every method gets the same handles; a line is the mean over meshes of the distorted
-area, the worst stretch (largest and smallest singular value of a triangle's map), the triangles
-that folded, the largest distance of a handle from its target, and CPU time.
+Meshes are jittered lattices inside four silhouettes, and inside the alpha of three cliparts if DATA
+is given. All methods get the same handles. A line has the means, over meshes, of the distorted
+area, of the largest and smallest stretch (singular values of the maps of triangles), of the number
+of folded triangles, and of CPU time; and the largest distance of a handle from its target.
+
+Points are complex numbers x + iy in pixels.
 """
 
 from __future__ import annotations
@@ -46,7 +48,16 @@ SILHOUETTES: dict[str, tuple[complex, Inside]] = {
 
 
 def lattice(size: complex, inside: Inside, pitch: float) -> tuple[Complex, Index]:
-    """Nodes and triangles of a jittered equilateral lattice: those whose centre is inside."""
+    """Makes a mesh of the triangles of a jittered lattice whose centres are inside a shape.
+
+    Args:
+        size: Width and height of the lattice.
+        inside: Whether points are inside the shape.
+        pitch: Distance of nodes in pixels.
+
+    Returns:
+        complex128 [N] nodes and int64 [T, 3] triangles of the largest connected part.
+    """
     rise = pitch * np.sqrt(0.75)
     across, down = int(size.real / pitch) + 2, int(size.imag / rise) + 2
     y, x = np.mgrid[:down, :across]
@@ -67,7 +78,7 @@ def lattice(size: complex, inside: Inside, pitch: float) -> tuple[Complex, Index
 
 
 def meshes(count: int, data: Path | None) -> Iterator[tuple[Complex, Index]]:
-    """A mesh of about `count` nodes for each shape."""
+    """Yields a mesh of about `count` nodes for each shape."""
     shapes = list(SILHOUETTES.values())
     for path in sorted((data / "clipart").glob("*.png"))[:3] if data else []:
         alpha = raster.read(path).pixels[..., 3] > 127
@@ -87,7 +98,15 @@ def _within(alpha: NDArray[np.bool_]) -> Inside:
 
 
 def drags(z: Complex, triangles: Index, amount: float) -> Iterator[tuple[str, Complex, Complex]]:
-    """Name, handle points and targets. Two ends lie on the long axis, with a pin between them."""
+    """Yields tests: name, handle points [H] and their targets [H].
+
+    Tests that are not random have handles at both ends of the long axis, some with a pin between.
+
+    Args:
+        z: complex128 [N] nodes.
+        triangles: int64 [T, 3] triangles.
+        amount: Standard deviation of random moves, relative to the length of the shape.
+    """
     centres = z[triangles].mean(1)
     offset = centres - centres.mean()
     axis = np.exp(0.5j * np.angle((offset**2).sum()))
@@ -115,10 +134,10 @@ def drags(z: Complex, triangles: Index, amount: float) -> Iterator[tuple[str, Co
 
 
 class ByVertex(Body):
-    """One rotation for each node and the edges around it (Sorkine & Alexa 2007)."""
+    """Body with one rotation for each node and the edges around it (Sorkine & Alexa 2007)."""
 
     def turns(self, z: Complex) -> Complex:
-        """The mean of the rotations of an edge's two nodes, [T, 3]."""
+        """Mean of the rotations of the two nodes of each edge, complex128 [T, 3]."""
         pull = (self.weight * np.conj(self.edge) * (z[self.end] - z[self.start])).ravel()
         node = np.zeros(self.count, complex)
         np.add.at(node, self.start.ravel(), pull)
@@ -128,16 +147,22 @@ class ByVertex(Body):
 
 
 class Uniform(Body):
-    """All edges weigh the same."""
+    """Body with the same weight for all edges."""
 
     def stiffen(self, factor: Real) -> None:
-        """See `Body`."""
+        """Sets equal cotangents, then stiffens as `Body` does."""
         self.cotangent = np.full_like(self.cotangent, np.sqrt(1 / 3))
         super().stiffen(factor)
 
 
 def rigid(kind: type[Body], substeps: int = 1, stiffen: bool = False) -> Method:
-    """As rigid as possible; the targets may be approached in several steps."""
+    """Makes an as-rigid-as-possible method.
+
+    Args:
+        kind: Class of the body.
+        substeps: Number of steps in which handles approach their targets.
+        stiffen: Whether to stiffen triangles that nearly fold, as the package does, instead.
+    """
 
     def run(z: Complex, triangles: Index, points: Complex, targets: Complex) -> Complex:
         body = kind(z, triangles, *deform._attach(z, triangles, points))
@@ -152,9 +177,9 @@ def rigid(kind: type[Body], substeps: int = 1, stiffen: bool = False) -> Method:
 
 
 def weights(body: Body, z: Complex) -> Real:
-    """Bounded biharmonic weights of each handle (Jacobson et al. 2011), [N, H].
+    """Bounded biharmonic weights of each handle (Jacobson et al. 2011), float64 [N, H].
 
-    The quadratic program, minimal w' L M^-1 L w with 0 <= w <= 1 and C w = identity, by ADMM.
+    ADMM solves the quadratic program: minimal w' L M^-1 L w with 0 <= w <= 1 and C w = identity.
     """
     n, handles = body.count, len(body.rows)
     laplacian = np.zeros((n, n))
@@ -178,10 +203,20 @@ def weights(body: Body, z: Complex) -> Real:
 def biharmonic(
     z: Complex, triangles: Index, points: Complex, targets: Complex, turning: bool = False
 ) -> Complex:
-    """Blends a motion of each handle: what it moves beyond the best rigid motion of them all.
+    """Deforms a mesh by bounded biharmonic weights.
 
-    With `turning` each handle also turns and scales, as makes the whole as rigid as possible
-    (Jacobson et al. 2012, "Fast automatic skinning transformations").
+    They blend the displacements of handles, in addition to the best rigid motion of all of them.
+
+    Args:
+        z: complex128 [N] nodes.
+        triangles: int64 [T, 3] triangles.
+        points: complex128 [H] handle points.
+        targets: complex128 [H] their targets.
+        turning: Whether each handle also turns and scales, so that the mesh is as rigid as possible
+            (Jacobson et al. 2012, "Fast automatic skinning transformations").
+
+    Returns:
+        complex128 [N] moved nodes.
     """
     body = Body(z, triangles, *deform._attach(z, triangles, points))
     blend = weights(body, z)
@@ -189,7 +224,7 @@ def biharmonic(
     now = start + blend @ (targets - at)
     if not turning:
         return now
-    arms = blend * (z[:, None] - points)  # what the factor a of motion a (z - point) + target adds
+    arms = blend * (z[:, None] - points)  # what a adds in the motion a (z - point) + target
     fixed = blend @ targets
 
     def spread(v: Complex) -> Complex:
@@ -204,7 +239,7 @@ def biharmonic(
 
 
 def shipped(z: Complex, triangles: Index, points: Complex, targets: Complex) -> Complex:
-    """The product's own function."""
+    """Deforms a mesh by the function of the package."""
     nodes, p, t = map(deform._columns, (z, points, targets))
     return deform._complex(deform.drag(nodes, triangles.astype(np.int32), p, t))
 
@@ -224,7 +259,12 @@ METHODS: dict[str, Method] = {
 def judge(
     z: Complex, triangles: Index, points: Complex, targets: Complex, method: Method
 ) -> list[float]:
-    """Distorted area in %, largest and smallest stretch, folds, handle error, CPU ms."""
+    """Measures a method on one test.
+
+    Returns:
+        Distorted area in percent, largest and smallest stretch, number of folded triangles, largest
+        distance of a handle from its target in pixels, and CPU milliseconds.
+    """
     begin = time.process_time()
     moved = method(z, triangles, points, targets)
     spent = 1e3 * (time.process_time() - begin)
@@ -245,7 +285,7 @@ def judge(
 
 
 def main() -> None:
-    """Entry point."""
+    """Runs the command line."""
     p = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     p.add_argument("data", type=Path, nargs="?", help="folder with clipart, for three more shapes")
     p.add_argument("--nodes", type=int, default=600)
@@ -264,7 +304,7 @@ def main() -> None:
     for kind in dict.fromkeys(name for name, *_ in cases):
         for method, run in METHODS.items():
             if args.nodes > 2000 and method.startswith("BBW"):
-                continue  # dense matrices
+                continue  # their dense matrices take too long
             rows = [judge(*case[1:], run) for case in cases if case[0] == kind]
             area, large, small, folds, _, spent = np.mean(rows, 0)
             error = max(row[4] for row in rows)

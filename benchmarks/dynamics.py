@@ -3,17 +3,17 @@
     OMP_NUM_THREADS=1 python -m benchmarks.dynamics [--steps N] [--nodes N] [--only PRESET ...]
 
 Three layers (a figure with thin limbs, a disc and a sheet as large as a canvas of 512 x 512) move
-by each preset in a loop of 4 s, its forces repeating. A line tells
+by each preset in a loop of 4 s, with repeating forces. For each preset a line has
 
-- energy: the most by which the total energy ever exceeded its initial value plus the work done
-  by wind, impulses, drag and handles so far, relative to the most that it ever was; bounded if
-  not above 0;
-- pins: how far a pinned node was from its place at most, px;
-- area: the most that the area of a layer as a whole changed, and the least area of a triangle
-  relative to rest, below 0 if one turned over;
-- mean: the displacement, mean over nodes and steps, px;
-- loop: how far the nodes move from the last frame to the first at most, relative to the most
-  they move between other frames: a seam shows above 1;
+- energy: largest excess of the total energy over its initial value plus the work done so far by
+  wind, impulses, drag and handles, relative to the largest total energy; it is bounded if not
+  above 0;
+- pins: largest displacement of a pinned node, px;
+- area: largest relative change of the area of a layer, and least area of a triangle relative to
+  rest, which is below 0 if one turned over;
+- mean: displacement, mean over nodes and steps, px;
+- loop: largest movement of a node from the last frame to the first, relative to the largest
+  between other frames; a seam shows above 1;
 - step: CPU ms of a step without these measures, least of 10 runs.
 """
 
@@ -38,7 +38,7 @@ CANVAS = (512, 512)
 
 
 def figure(x: Real, y: Real) -> NDArray[np.bool_]:
-    """Head, trunk, arms and legs in the middle of the canvas."""
+    """Whether points x, y lie in a figure of head, trunk, arms and legs amid the canvas."""
     x = np.abs(x - 256)
     trunk = (np.hypot(x, y - 120) < 50) | ((x < 45) & (y > 160) & (y < 330))
     legs = (np.abs(x - 28) < 16) & (y >= 310) & (y < 470)
@@ -46,7 +46,7 @@ def figure(x: Real, y: Real) -> NDArray[np.bool_]:
 
 
 def layers(count: int) -> list[Body]:
-    """The three layers, with about `count` nodes in all."""
+    """Makes the three layers, with about `count` nodes in all."""
     shapes: dict[str, Inside] = {
         "figure": figure,
         "disc": lambda x, y: np.hypot(x - 256, y - 256) < 150,
@@ -64,7 +64,13 @@ def layers(count: int) -> list[Body]:
 
 
 def mesh(name: str, inside: Inside, pitch: float) -> Body:
-    """A jittered equilateral lattice on the canvas: the triangles whose centre is inside."""
+    """Makes a body of the triangles of a jittered lattice whose centres are inside a shape.
+
+    Args:
+        name: Name of the body.
+        inside: Whether points x, y are inside the shape.
+        pitch: Distance of nodes in pixels.
+    """
     rise = pitch * np.sqrt(0.75)
     across, down = int(CANVAS[0] / pitch) + 2, int(CANVAS[1] / rise) + 2
     y, x = np.mgrid[:down, :across]
@@ -82,7 +88,7 @@ def mesh(name: str, inside: Inside, pitch: float) -> Body:
 
 
 def measure(bodies: list[Body], motion: Motion, steps: int) -> str:
-    """Runs the steps of a motion; a line of what came of it."""
+    """Simulates the steps of a motion, and returns the line of its measures."""
     system = System(bodies, motion, CANVAS, measured=True)
     still = system.w == 0
     for *_, led in system.curves:
@@ -107,7 +113,7 @@ def measure(bodies: list[Body], motion: Motion, steps: int) -> str:
 
 
 def seam(bodies: list[Body], motion: Motion) -> float:
-    """The step from the last frame to the first relative to the largest of the others."""
+    """Movement from the last frame to the first, relative to the largest between other frames."""
     frames = simulate(bodies, motion, canvas=CANVAS).displacements
     every = np.concatenate(list(frames.values()), axis=1)
     steps = np.abs(np.roll(every, -1, axis=0) - every).max((1, 2))
@@ -115,7 +121,7 @@ def seam(bodies: list[Body], motion: Motion) -> float:
 
 
 def cost(bodies: list[Body], motion: Motion) -> float:
-    """CPU ms of a step: the least of 10 means over 100 steps."""
+    """CPU milliseconds of a step: the least of 10 means over 100 steps."""
     system, spent = System(bodies, motion, CANVAS), []
     for _ in range(10):
         start = time.process_time()
@@ -126,7 +132,7 @@ def cost(bodies: list[Body], motion: Motion) -> float:
 
 
 def main() -> None:
-    """Prints a line a preset."""
+    """Runs the command line: prints a line for each preset."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--steps", type=int, default=10_000)
     parser.add_argument("--nodes", type=int, default=1600)

@@ -38,7 +38,16 @@ RUNS = 7
 
 
 def regions(data: Path, name: str, crop: bool = True) -> tuple[Pixels, list[Region]]:
-    """A Kodak picture and the layers of its label map, cropped to 512 x 512."""
+    """Reads a Kodak picture and its label map.
+
+    Args:
+        data: Folder with ``kodak/`` and ``kodak_masks/``.
+        name: Name of the picture, such as ``kodim23``.
+        crop: Whether to take the middle 512 x 512 only.
+
+    Returns:
+        The picture [H, W, 3], and a region for each label but 0.
+    """
     pixels = read_rgb(data / "kodak" / f"{name}.png")
     labels = read_rgb(data / "kodak_masks" / f"{name}.png")[..., :1]
     if crop:
@@ -48,7 +57,10 @@ def regions(data: Path, name: str, crop: bool = True) -> tuple[Pixels, list[Regi
 
 
 def times(path: Path) -> None:
-    """Affine edit and render, cold (nothing computed before) and cached (rendered before)."""
+    """Prints times of an edit and a rendering for each engine.
+
+    They are cold, with nothing computed before, and cached, with the picture rendered before.
+    """
     print("edit and render at 512x512, one thread, CPU ms: turned, least and median of", RUNS)
     engines = ["numpy", "native"] if kernel.available() else ["numpy"]
     for engine in engines:
@@ -57,7 +69,7 @@ def times(path: Path) -> None:
 
 
 def time_edits(path: str, engine: str) -> None:
-    """Prints the times of one engine; runs in a process of its own."""
+    """Prints the times of one engine; `times` runs this in a process of its own."""
     image = pxi.open(path)
 
     def measured(before: Callable[[], object], work: Callable[[int], object]) -> str:
@@ -93,7 +105,7 @@ def time_edits(path: str, engine: str) -> None:
 
 
 def exactness(image: Image) -> None:
-    """The promises that hold exactly, each tried on the picture."""
+    """Tries each exact promise of edits on a picture, and prints whether it holds."""
     name = image.layers[-1].name
     layer = image.layers[name]
     before = image.render()
@@ -134,7 +146,7 @@ def _coverage(image: Image, name: str) -> NDArray[np.int32]:
 
 
 def _near(image: Image, name: str) -> NDArray[np.bool_]:
-    """Pixels within 2 px of a layer's coverage."""
+    """Pixels within 2 px of those that a layer covers, bool [H, W]."""
     import cv2
 
     seen = (_coverage(image, name) > 0).astype(np.uint8)
@@ -143,7 +155,7 @@ def _near(image: Image, name: str) -> NDArray[np.bool_]:
 
 
 def meshes(data: Path) -> None:
-    """Bytes of the meshes of all objects of the label maps, 512 x 512."""
+    """Prints the bytes of the meshes of all objects of the label maps, at 512 x 512."""
     rates, nodes = [], []
     for file in kodak(data):
         if not (data / "kodak_masks" / file.name).exists():
@@ -163,7 +175,7 @@ def meshes(data: Path) -> None:
 
 
 def main() -> None:
-    """Entry point."""
+    """Runs the command line."""
     sections = ("time", "exact", "mesh", "removal", "paper")
     p = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     p.add_argument("data", type=Path)

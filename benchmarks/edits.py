@@ -47,11 +47,11 @@ SCRIPTS: tuple[list[dict[str, object]], ...] = (
         {"op": "recolour", "layer": "twin", "hue": 120},
     ],
 )
-"""The edits of each picture, in rows of two."""
+"""Edits of each part of the picture; two parts make a row."""
 
 
 def encoded(data: Path) -> Image:
-    """Kodak 23 with the layers back, red and blue."""
+    """Encodes Kodak 23 with the layers back, red and blue."""
     pixels = read_rgb(data / "kodak" / "kodim23.png")
     labels = read_rgb(data / "kodak_masks" / "kodim23.png")[..., 0]
     values = [v for v in np.unique(labels) if v]
@@ -60,7 +60,7 @@ def encoded(data: Path) -> Image:
 
 
 def main() -> None:
-    """Entry point."""
+    """Runs the command line."""
     p = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     p.add_argument("data", type=Path)
     p.add_argument("output", type=Path)

@@ -33,7 +33,15 @@ TARGETS = {"kodim23": 35.5, "kodim15": 33.5, "kodim05": 28.3}
 
 
 def fit_float(pixels: Pixels, steps: int) -> tuple[float, int, float]:
-    """PSNR of the rounded 8-bit picture, stored parameters, CPU seconds of a float fit."""
+    """Fits one layer in floating point, without quantization.
+
+    Args:
+        pixels: uint8 [S, S, 3] picture.
+        steps: Number of optimizer steps.
+
+    Returns:
+        PSNR in dB of the picture rounded to 8 bits, number of parameters, and CPU seconds.
+    """
     size = pixels.shape[0]
     problem = build(to_float(pixels)[0], [None], FLOAT_SHAPE, size / (FLOAT_GRID - 1))
     started = time.process_time()
@@ -46,7 +54,7 @@ def fit_float(pixels: Pixels, steps: int) -> tuple[float, int, float]:
 
 
 def evaluate(problem: object, state: State) -> Pixels:
-    """Unquantized output [pixels, 3] of a problem with one layer, in numpy."""
+    """Computes the unquantized output float32 [pixels, 3] of a problem with one layer in numpy."""
     from proxyimg_codec.encoder.implicit.fit_problem import Problem
 
     assert isinstance(problem, Problem)
@@ -68,7 +76,7 @@ def evaluate(problem: object, state: State) -> Pixels:
 
 
 def float_figures(data: Path, quick: bool) -> None:
-    """512x512 centre crops, one layer, before quantization; and an enlarged 256-px photo."""
+    """Prints figures of one layer before quantization, of centre crops and enlarged photos."""
     print("\nfloat: 512x512 centre crops, one layer, before quantization")
     values = []
     for path in kodak(data):
@@ -94,7 +102,7 @@ def float_figures(data: Path, quick: bool) -> None:
 
 
 def quantized_figures(data: Path, quick: bool) -> None:
-    """Whole files with 4-bit codes and an 8-bit net, beside the float fit that was quantized."""
+    """Prints figures of files with 4-bit codes and 8-bit weights, and of the fits before."""
     settings = Settings(quality=47, effort=6, max_layers=1, feature_bits=4, net_bits=8)
     print(f"\nquantized: whole files, {settings}")
     drops = []
@@ -117,7 +125,7 @@ def quantized_figures(data: Path, quick: bool) -> None:
 
 
 def layer_figures(data: Path, quick: bool) -> None:
-    """Layers from label maps against one layer, at equal file size by interpolation."""
+    """Prints figures of layers from label maps, and of one layer interpolated to the same size."""
     print("\nlayers: PSNR of layered files against one layer at equal size (target -0.7 dB mean)")
     gaps = []
     for path in sorted((data / "kodak_masks").glob("*.png"))[: 4 if quick else None]:
@@ -161,7 +169,7 @@ print(f"{{pixels.shape[1]}}x{{pixels.shape[0]}}: {{time.perf_counter() - t:.1f}}
 
 
 def encode_figures(data: Path, quick: bool) -> None:
-    """Defaults on two cores, whole process: 512x512 and 2040x1360."""
+    """Prints time and memory of encoding at defaults in a process: 512x512 and a large photo."""
     print("\nencode at defaults (targets: 40 s, 1.5 GB; 4 GB)")
     large = sorted((data / "photo2k").glob("*.webp"))[0]
     for path, crop in ((data / "kodak/kodim23.png", True), (large, False)):
@@ -193,7 +201,7 @@ print(f"open {{loaded:.3f}} s, render {{best:.3f}} s = {{n / best / 1e6:.2f}} Mp
 
 
 def decode_figures(data: Path, quick: bool) -> None:
-    """One thread, CPU time: opening (entropy decoding) and rendering apart and together."""
+    """Prints CPU times of opening (entropy decoding) and rendering on one thread."""
     import tempfile
 
     print("\ndecode 512x512, one thread (targets: numpy 0.7, ort 2 Mpx/s; 4096x4096 in 1 GB)")
@@ -221,7 +229,7 @@ SECTIONS: dict[str, Callable[[Path, bool], None]] = {
 
 
 def main() -> None:
-    """Entry point."""
+    """Runs the command line."""
     p = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     p.add_argument("data", type=Path, help="folder with kodak, kodak_masks, photo, photo2k")
     p.add_argument("--only", nargs="+", choices=list(SECTIONS), default=list(SECTIONS))

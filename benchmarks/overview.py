@@ -1,4 +1,4 @@
-"""Makes the README's picture from the demo photo and the masks of its two birds.
+"""Makes the picture of the README from the demo photo and the masks of its two birds.
 
 python -m benchmarks.overview MASKS OUT
 """
@@ -23,13 +23,13 @@ GAP = 8
 
 
 def on_white(pixels: Pixels) -> Pixels:
-    """Straight alpha over white."""
+    """Composites a picture, uint8 [H, W, 4] with straight alpha, over white: uint8 [H, W, 3]."""
     alpha = pixels[..., 3:] / 255.0
     return np.rint(pixels[..., :3] * alpha + 255 * (1 - alpha)).astype(np.uint8)
 
 
 def main() -> None:
-    """Entry point."""
+    """Runs the command line."""
     masks, out = sys.argv[1:]
     photo = read_rgb(PHOTO)
     height, width = photo.shape[:2]

@@ -3,8 +3,8 @@
     python -m benchmarks.paper DATA [--crops N | --names NAME ...] [--size N] [--steps N]
                                     [--ablations]
 
-DATA is a folder with kodak/ (24 PNG). The crops are central ones of evenly chosen pictures, or of
-those named, in layers of the built-in decomposition with Chamfer boundaries.
+DATA is a folder with kodak/ (24 PNG). Crops are the centres of evenly chosen pictures, or of those
+named, in layers of the built-in segmenter with Chamfer boundaries.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ from proxyimg_codec.io.samples import to_float
 from proxyimg_codec.texture.network import NetShape
 
 PAPER_CODES, PAPER_PARAMETERS, PAPER_PSNR = 263, 59955, 36.99
-"""What ProxyImg reports, on pictures of its own."""
+"""Codes, parameters and PSNR in dB that ProxyImg reports, on pictures of its own."""
 
 SETTINGS = Settings(**PRESETS["paper"], jobs=1)
 
 PROBE = 300
-"""Steps that tell how fast direct fitting is."""
+"""Optimizer steps from which the speed of direct fitting is measured."""
 
 EVALUATED = 8192
 """Pixels evaluated at a time."""
@@ -54,11 +54,17 @@ ABLATIONS = {
     "inverse distance inside": NodeOptions(distance=True),
     "random code a node": NodeOptions(own_codes=True),
 }
-"""The last two cannot be stored in a file."""
+"""Variants of node sampling, by description; files cannot store the last two."""
 
 
 class Fitted(NamedTuple):
-    """A float fit: PSNR of colours that are not rounded, parameters, CPU seconds."""
+    """Result of a fit in floating point.
+
+    Attributes:
+        psnr: PSNR in dB of colours that are not rounded; `direct` gives that of rounded ones.
+        parameters: Number of parameters.
+        seconds: CPU seconds.
+    """
 
     psnr: float
     parameters: int
@@ -70,30 +76,35 @@ class Fitted(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A crop and its layers."""
+    """Crop of a picture, with its layers.
+
+    Attributes:
+        name: Name of the picture.
+        pixels: uint8 [S, S, 3] crop.
+    """
 
     name: str
     pixels: Pixels
 
     @cached_property
     def plan(self) -> Plan:
-        """Layers with meshes."""
+        """Plan of the layers, with meshes."""
         picture = to_float(self.pixels)[0]
         return with_meshes(picture, plan_layers(picture, SETTINGS, None), SETTINGS)
 
     @cached_property
     def start(self) -> Problem:
-        """Pixels and layers, without node sampling."""
+        """Problem of direct sampling that problems of node sampling start from."""
         outlines = [layer.boundary for layer in self.plan.layers]
         return build(to_float(self.pixels)[0], outlines, NetShape(1, 0, 1, 1, 3), np.inf)
 
     def problem(self, options: NodeOptions) -> NodeProblem:
-        """The problem of node sampling."""
+        """Makes the problem of node sampling."""
         size = (self.pixels.shape[1], self.pixels.shape[0])
         return node_problem.build(self.start, self.plan.layers, size, options)
 
     def codes(self, cell: float) -> int:
-        """Codes of all planes with cells of that size."""
+        """Number of codes of all planes with cells of a side in canvas pixels."""
         layers = zip(self.start.planes, self.plan.layers, strict=True)
         several, options = len(self.plan.layers) > 1, NodeOptions(cell=cell)
         return sum(
@@ -102,14 +113,14 @@ class Case:
         )
 
     def enlarged(self) -> Case:
-        """The crop reduced to half its size and enlarged again, as it has no pixel's detail."""
+        """Case of the crop at half its size, enlarged again, so that it has no fine detail."""
         size = self.pixels.shape[1::-1]
         small = cv2.resize(self.pixels, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
         return Case(self.name, cv2.resize(small, size, interpolation=cv2.INTER_CUBIC))
 
 
 def fitted(problem: NodeProblem, steps: int) -> Fitted:
-    """A float fit of the literal method."""
+    """Fits a problem of node sampling in floating point."""
     started = time.process_time()
     trainer = fit_node.NodeTrainer(problem, "cpu")
     state = fit_node.fit_float(problem, trainer, steps, 0)
@@ -123,19 +134,19 @@ def fitted(problem: NodeProblem, steps: int) -> Fitted:
 
 
 def cell_of_the_paper(case: Case) -> float:
-    """The size of cells at which the planes have about as many codes as the paper's."""
+    """Side of cells, in canvas pixels, at which there are about as many codes as in the paper."""
     cells = [float(cell) for cell in np.geomspace(4, 64, 200)]
     return min(cells, key=lambda cell: abs(case.codes(cell) - PAPER_CODES))
 
 
 def direct(case: Case, seconds: float) -> Fitted:
-    """Direct sampling with about as many parameters, for as long."""
+    """Fits direct sampling for about so many CPU seconds, with `benchmarks.figures.FLOAT_SHAPE`."""
     _, _, spent = fit_float(case.pixels, PROBE)
     return Fitted(*fit_float(case.pixels, max(round(PROBE * seconds / spent), 1)))
 
 
 def table(cases: list[Case], steps: int) -> None:
-    """The paper's figure beside ours."""
+    """Prints the figure of the paper, and those of node sampling and direct sampling."""
     print(f"\nProxyImg's own: {PAPER_PSNR:6.2f} dB {PAPER_PARAMETERS:7d} parameters, on other "
           "pictures, which are not published")  # fmt: skip
     rows: dict[str, list[Fitted]] = {}
@@ -159,7 +170,7 @@ def table(cases: list[Case], steps: int) -> None:
 
 
 def files(cases: list[Case]) -> None:
-    """Whole files: the paper's preset and the defaults."""
+    """Prints figures of whole files, by the preset of the paper and by default."""
     print("\nwhole files, --preset paper (4-bit codes and network) and defaults")
     for case in cases:
         size = case.pixels.shape[0] * case.pixels.shape[1]
@@ -174,7 +185,7 @@ def files(cases: list[Case]) -> None:
 
 
 def ablations(cases: list[Case], steps: int) -> None:
-    """What each part of the method is worth, after equally many steps."""
+    """Prints figures of each variant of the method, after equally many steps."""
     print("\nablations, o = 8")
     rows: dict[str, list[Fitted]] = {name: [] for name in ABLATIONS}
     for case in cases:
@@ -197,7 +208,16 @@ def run(
     steps: int = 2000,
     parts: bool = True,
 ) -> None:
-    """Everything; without the ablations if not `parts`."""
+    """Prints all figures.
+
+    Args:
+        data: Folder with ``kodak/``.
+        crops: Number of pictures, chosen evenly.
+        names: Names of pictures to use instead.
+        size: Side of a crop in pixels.
+        steps: Number of optimizer steps.
+        parts: Whether to print the ablations too.
+    """
     chosen = kodak(data)
     if names:
         chosen = [path for path in chosen if path.stem in names]
@@ -212,7 +232,7 @@ def run(
 
 
 def main() -> None:
-    """Entry point."""
+    """Runs the command line."""
     p = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     p.add_argument("data", type=Path, help="folder with kodak")
     p.add_argument("--crops", type=int, default=4, help="number of pictures; default 4")

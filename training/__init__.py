@@ -1,1 +1,1 @@
-"""How the registered pyramid model is trained; see README.md."""
+"""Training of the registered pyramid model; see README.md."""

@@ -16,25 +16,25 @@ from proxyimg_codec.texture.registered_model import CAUSAL, LEVEL_SETS, Array, p
 
 
 def fixed(values: Tensor | None, exponent: int) -> Array:
-    """An array rounded to units of 2**exponent."""
+    """Rounds a tensor to an array of integers in units of 2**exponent."""
     assert values is not None
     scaled = np.rint(values.detach().double().numpy() * 2.0**-exponent)
     return Array(scaled.astype(np.int32), exponent)
 
 
 def weights(values: Tensor) -> Array:
-    """Weights as int8, in the unit that training simulates."""
+    """Rounds weights to 8-bit integers, in the unit that training simulates."""
     return fixed(values, round(math.log2(weight_step(values))))
 
 
 def small(values: Tensor) -> Array:
-    """Weights as int8 in the finest unit that holds them."""
+    """Rounds weights to 8-bit integers, in the smallest power of two that fits."""
     most = max(float(values.detach().abs().max()), 1e-6)
     return fixed(values, math.ceil(math.log2(most / 127)))
 
 
 def arrays_of(model: Model) -> dict[str, Array]:
-    """All arrays of the registered model, by their names in the file."""
+    """Arrays of the registered model, by their names in the file."""
     out = {"to_colour": fixed(model.to_colour, -16)}
     for number in range(LEVEL_SETS):
         level = model.level(number + 1)
@@ -67,7 +67,7 @@ def arrays_of(model: Model) -> dict[str, Array]:
 
 
 def main() -> None:
-    """Command line."""
+    """Runs the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("state", type=Path)
     parser.add_argument("out", type=Path, help="folder: pyramid-1.bin and pyramid-1-analysis.npz")

@@ -1,4 +1,4 @@
-"""Crops for training: photographs and graphics of a folder, and drawn shapes."""
+"""Random crops for training, of the pictures in a folder and of drawn shapes."""
 
 from __future__ import annotations
 
@@ -14,22 +14,24 @@ from proxyimg_codec.errors import InputError
 Pixels = NDArray[np.uint8]
 
 SIZE = 256
+"""Side of a crop in pixels."""
+
 DRAWN = 0.06
-"""Share of crops that are drawn shapes: flat colours and sharp edges are rare in photographs."""
+"""Share of drawn shapes among crops; photographs rarely have flat colours and sharp edges."""
 
 
 TEST_PICTURES = Path(__file__).with_name("test_pictures.txt")
-"""Digests of the pictures that the codec is judged by, one a line: they never enter training."""
+"""File with the digests of the test pictures, one per line; these must never enter training."""
 
 
 def digest(picture: Pixels) -> str:
-    """SHA-256 of the shape and the samples of a picture [H, W, 3]."""
+    """SHA-256 of the size and the samples of a picture, uint8 [H, W, 3], in hexadecimal."""
     head = f"{picture.shape[1]}x{picture.shape[0]} ".encode()
     return hashlib.sha256(head + np.ascontiguousarray(picture).tobytes()).hexdigest()
 
 
 def read(path: Path) -> Pixels | None:
-    """A picture file as RGB [H, W, 3], or None if it is none."""
+    """Reads a picture file as RGB, uint8 [H, W, 3]; returns None if it cannot be read."""
     picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
     if picture is None:
         return None
@@ -37,7 +39,13 @@ def read(path: Path) -> Pixels | None:
 
 
 def load(folder: Path) -> list[Pixels]:
-    """All pictures of a folder as RGB [H, W, 3], in the order of their names.
+    """Reads all pictures of a folder that have at least `SIZE` pixels a side.
+
+    Args:
+        folder: The folder; other files in it are skipped.
+
+    Returns:
+        Pictures as RGB, uint8 [H, W, 3], in the order of their names.
 
     Raises:
         InputError: A test picture is among them, or there is no picture.
@@ -57,7 +65,15 @@ def load(folder: Path) -> list[Pixels]:
 
 
 def crop(pictures: list[Pixels], rng: np.random.Generator) -> Pixels:
-    """A random crop [SIZE, SIZE, 3], as cameras, scanners and websites would have made it."""
+    """Makes a random crop, with the flaws that cameras, scanners and websites leave.
+
+    Args:
+        pictures: Pictures as RGB, uint8 [H, W, 3], of at least `SIZE` pixels a side.
+        rng: Generator of all random choices.
+
+    Returns:
+        uint8 [SIZE, SIZE, 3].
+    """
     if rng.random() < DRAWN:
         return drawn(rng)
     picture = pictures[rng.integers(len(pictures))]
@@ -67,7 +83,7 @@ def crop(pictures: list[Pixels], rng: np.random.Generator) -> Pixels:
     if kind < 0.3:
         scale = rng.uniform(0.5, 1.0)
     elif kind < 0.65:
-        scale = rng.uniform(1.0, 1.5)  # the pictures were reduced: others are softer
+        scale = rng.uniform(1.0, 1.5)  # pictures of the folder were reduced; others are softer
     side = min(round(SIZE / scale), height, width)
     y, x = rng.integers(height - side + 1), rng.integers(width - side + 1)
     part = picture[y : y + side, x : x + side]
@@ -88,7 +104,7 @@ def crop(pictures: list[Pixels], rng: np.random.Generator) -> Pixels:
 
 
 def half_chroma(picture: Pixels) -> Pixels:
-    """The picture with chroma of half the resolution, as most cameras and JPEG leave it."""
+    """Halves the resolution of chroma, as most cameras and JPEG do; uint8 [SIZE, SIZE, 3]."""
     planes = cv2.cvtColor(picture, cv2.COLOR_RGB2YCrCb)
     small = cv2.resize(planes[..., 1:], (SIZE // 2, SIZE // 2), interpolation=cv2.INTER_AREA)
     planes[..., 1:] = cv2.resize(small, (SIZE, SIZE), interpolation=cv2.INTER_LINEAR)
@@ -96,14 +112,14 @@ def half_chroma(picture: Pixels) -> Pixels:
 
 
 def grainy(picture: Pixels, rng: np.random.Generator) -> Pixels:
-    """The picture with grain in its luma."""
+    """Adds grain to the luma of a picture, uint8 [SIZE, SIZE, 3]."""
     grain = rng.normal(0, rng.uniform(1, 5), (SIZE, SIZE, 1)).astype(np.float32)
     soft = np.asarray(cv2.GaussianBlur(grain, (0, 0), rng.uniform(0.3, 0.8)))[..., None]
     return np.asarray(np.clip(np.rint(picture + soft), 0, 255), np.uint8)
 
 
 def drawn(rng: np.random.Generator) -> Pixels:
-    """Random shapes and letters over a gradient."""
+    """Draws random shapes and letters over a gradient, uint8 [SIZE, SIZE, 3]."""
     shift = 4
     top, bottom = rng.integers(0, 256, (2, 3))
     ramp = np.linspace(0, 1, SIZE)[:, None, None] * np.ones((1, SIZE, 1))

@@ -26,14 +26,17 @@ from proxyimg_codec.encoder.pyramid.refine import (
 from .pictures import Pixels, crop, load
 
 BATCH = 4
+"""Crops per batch."""
+
 STEPS = (3.0, 160.0)
-"""Range of quantization steps, log-uniform."""
+"""Range of quantization steps, which are drawn log-uniformly."""
+
 ROUNDS = 10
-"""Rounds of refinement that a batch of latents gets in the second phase."""
+"""Rounds of refinement of the latents of a batch in the second phase."""
 
 
 def main() -> None:
-    """Command line."""
+    """Runs the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--out", type=Path, required=True)
@@ -65,7 +68,16 @@ def main() -> None:
 def batch(
     pictures: list[Pixels], rng: np.random.Generator, steps: tuple[float, float]
 ) -> tuple[Tensor, Tensor]:
-    """Pictures [B, 3, S, S] in 0..255 and their quantization steps [B]."""
+    """Draws a batch.
+
+    Args:
+        pictures: Pictures as RGB, uint8 [H, W, 3].
+        rng: Generator of all random choices.
+        steps: Range of quantization steps.
+
+    Returns:
+        float32 [B, 3, S, S] crops in 0..255, and float32 [B] their quantization steps.
+    """
     crops = np.stack([crop(pictures, rng) for _ in range(BATCH)]).transpose(0, 3, 1, 2)
     step = np.exp(rng.uniform(math.log(steps[0]), math.log(steps[1]), BATCH))
     x = torch.from_numpy(crops.astype(np.float32)).to(memory_format=torch.channels_last)
@@ -73,7 +85,15 @@ def batch(
 
 
 def groups_of(model: Model, *, analysis: bool, rate: float) -> list[dict[str, Any]]:
-    """Parameter groups; what is linear and starts from the wavelet moves slowly."""
+    """Makes the parameter groups of the optimizer.
+
+    Linear transforms, which start from the wavelet, have a lower learning rate than networks.
+
+    Args:
+        model: The model.
+        analysis: Whether to train the analysis; if not, its gradients are switched off.
+        rate: Learning rate of the networks.
+    """
     slow: list[Tensor] = []
     fast: list[Tensor] = []
     for name, parameter in model.named_parameters():
@@ -89,7 +109,17 @@ def groups_of(model: Model, *, analysis: bool, rate: float) -> list[dict[str, An
 
 
 class Journal:
-    """Counts steps, prints means, saves the state."""
+    """Journal of a run: it counts steps, prints means, and saves the state.
+
+    Args:
+        model: The model.
+        opt: The optimizer; its state is restored from `state`, if there is any.
+        state: State of an earlier run, or an empty dictionary.
+        args: Arguments of the command line.
+
+    Attributes:
+        done: Number of finished steps.
+    """
 
     def __init__(self, model: Model, opt: torch.optim.Optimizer, state: dict[str, Any], args: Any):
         self.model, self.opt, self.args = model, opt, args
@@ -100,19 +130,22 @@ class Journal:
         self.rows: list[tuple[float, float]] = []
 
     def rng(self) -> np.random.Generator:
-        """Random numbers of the present step: a resumed run draws what an unbroken one does."""
+        """Returns the generator of the present step, and seeds torch.
+
+        So a resumed run draws the same numbers as an unbroken one.
+        """
         torch.manual_seed(self.args.seed * 1_000_003 + self.done)
         return np.random.default_rng((self.args.seed, self.done))
 
     def set_rates(self) -> None:
-        """Warm-up, then a cosine."""
+        """Sets the learning rates of the present step: a warm-up, then a cosine."""
         share = self.done / self.args.steps
         scale = min(1, (self.done + 1) / 100) * (0.5 + 0.5 * math.cos(math.pi * share))
         for group in self.opt.param_groups:
             group["lr"] = group["base"] * (scale * 0.99 + 0.01)
 
     def add(self, distortion: Tensor, rate: Tensor) -> None:
-        """Records a step; saves now and then, and at the end."""
+        """Records distortion [B] and rate [B] of a step; saves every 100 steps, and at the end."""
         self.done += 1
         self.rows.append((distortion.mean().item(), rate.mean().item()))
         if self.done % 100 == 0 or self.done >= self.args.steps:
@@ -128,7 +161,7 @@ class Journal:
 
 
 def analysed(model: Model, pictures: list[Pixels], state: dict[str, Any], args: Any) -> None:
-    """Phase 1: everything at once; latents come from the analysis, rounded straight through."""
+    """Runs phase 1, which trains all weights; analysed latents are rounded straight through."""
     rate = 2e-3 * args.rate
     opt = torch.optim.Adam(groups_of(model, analysis=True, rate=rate), betas=(0.9, 0.99))
     journal = Journal(model, opt, state, args)
@@ -151,7 +184,7 @@ def analysed(model: Model, pictures: list[Pixels], state: dict[str, Any], args: 
 
 
 def refined(model: Model, pictures: list[Pixels], state: dict[str, Any], args: Any) -> None:
-    """Phase 2: synthesis and context learn on latents while these are refined, in integers."""
+    """Runs phase 2, which trains synthesis and context in simulated integers on refined latents."""
     model.set_mode(integer=True)
     opt = torch.optim.Adam(groups_of(model, analysis=False, rate=6e-4 * args.rate),
                            betas=(0.9, 0.99))  # fmt: skip
@@ -170,7 +203,7 @@ def refined(model: Model, pictures: list[Pixels], state: dict[str, Any], args: A
             spent.total.backward()  # type: ignore[no-untyped-call]
             slopes = [y.grad for y in ys if y.grad is not None]
             now = moved(model, step, [y.detach() for y in ys], spent.likely, slopes, random)
-            if turn > 0:  # the first rounding is not what will be coded
+            if turn > 0:  # latents of the first round are not refined, unlike those of a file
                 journal.set_rates()
                 torch.nn.utils.clip_grad_norm_(kept, 2e5)
                 opt.step()

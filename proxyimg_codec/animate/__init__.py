@@ -1,1 +1,1 @@
-"""Animation: position-based dynamics on the proxy nodes of layers."""
+"""Animation of layers: position-based dynamics of their proxy nodes."""

@@ -1,4 +1,4 @@
-"""Gives a picture a motion: meshes, simulation, tracks."""
+"""Animation of a picture: makes meshes, simulates a motion, and bakes it to tracks."""
 
 from __future__ import annotations
 
@@ -21,24 +21,27 @@ from .presets import Box
 from .simulate import simulate
 
 EDGE = 0.035
-"""Edges of meshes that are made for motion, relative to the diagonal of a layer."""
+"""Edge length of meshes that are made for motion, relative to the diagonal of a layer."""
 
 
 def movable(image: Pictured) -> list[Layer]:
-    """The layers that can move: all that are drawn but the back layer of an opaque picture."""
+    """Layers that can move: those not hidden, except the back layer of an opaque picture."""
     layers = list(image.picture.layers)
     return [v for v in layers[image.picture.opaque :] if not v.pose.hidden]
 
 
 def boxes(image: Pictured, names: Sequence[str | int] | None = None) -> dict[str, Box]:
-    """x0, y0, x1, y1 in canvas pixels, at rest, of layers by name.
+    """Bounds of layers at rest.
 
     Args:
         image: The picture.
         names: Names or positions of the layers; None for all that can move.
 
+    Returns:
+        x0, y0, x1, y1 in canvas pixels of each layer, by name.
+
     Raises:
-        UsageError: There is no such layer, it cannot move, or no layer can.
+        UsageError: There is no such layer, a layer cannot move, or no layer can.
     """
     picture = image.picture
     return {v.name: _box(v, picture.size) for v in _chosen(picture, names)}
@@ -73,17 +76,17 @@ def preset(
     together: bool = True,
     **options: Any,
 ) -> Motion:
-    """A motion that suits a picture.
+    """Makes the motion of a preset for a picture.
 
     Args:
         image: The picture.
-        name: One of `motion.PRESETS`.
+        name: Name of the preset, one of `motion.PRESETS`.
         names: Names or positions of the layers that move; None for all that can.
         together: Whether layers that touch move as one body.
-        options: As of `motion.preset`: duration, fps, loop, seed, pins.
+        options: Options of `motion.preset`: ``duration``, ``fps``, ``loop``, ``seed``, ``pins``.
 
     Raises:
-        UsageError: There is no such preset or layer, or an option makes no sense.
+        UsageError: There is no such preset or layer, or an option is invalid.
     """
     picture = image.picture
     chosen = _chosen(picture, names)
@@ -102,16 +105,20 @@ def preset(
 def animate(
     picture: Picture, motion: Motion, progress: Callable[[int, int], None] | None = None
 ) -> Picture:
-    """The picture with a motion instead of the one it may have.
+    """Simulates a motion, and gives it to a picture; a motion that the picture had is replaced.
 
     Args:
         picture: The picture.
-        motion: What moves, and how.
-        progress: Called with the number of simulated frames and of all frames to simulate.
+        motion: The motion.
+        progress: Called with the number of simulated frames, and the number of all frames to
+            simulate.
+
+    Returns:
+        The picture with a timeline and tracks. Layers that move and had no mesh get one.
 
     Raises:
         UsageError: The motion does not fit the picture.
-        LimitError: Nodes are flung out of reach.
+        LimitError: Nodes move farther than a file can hold.
     """
     cast = _Cast(picture, motion)
     found = simulate(cast.bodies, cast.motion, canvas=picture.size, progress=progress)
@@ -131,16 +138,20 @@ def animate(
 
 
 class _Cast:
-    """What takes part in a motion.
+    """Layers and bodies that take part in a motion.
+
+    Args:
+        picture: The picture.
+        motion: The motion.
 
     Attributes:
         layers: All layers that can move, by name, with meshes.
-        bodies: What is simulated: such layers, and wholes of layers that move as one.
-        motion: What the bodies do; wholes have the names of their first layers.
+        bodies: Bodies to simulate: single layers, and unions of layers that move as one.
+        motion: Motion of the bodies; a union has the name of its first layer.
     """
 
     def __init__(self, picture: Picture, motion: Motion) -> None:
-        """Raises `UsageError` if the motion does not fit the picture."""
+        """Raises `UsageError` if a layer that the motion names cannot move, or none can."""
         able, size = _chosen(picture, None), picture.size
         for name in motion.layers:
             if name != "*" and name in (v.name for v in picture.layers):
@@ -157,11 +168,11 @@ class _Cast:
         self.motion = replace(motion, layers=kept)
 
     def first(self, name: str) -> str:
-        """The first layer of the whole that a layer is part of; itself if it moves alone."""
+        """Name of the body that a layer is part of: that of its first layer."""
         return self._first_of.get(name, name)
 
     def displacements(self, found: Mapping[str, Real]) -> dict[str, Real]:
-        """Displacements [F, N, 2] of each layer that moves, from those of the bodies by name."""
+        """Displacements of layers from those of their bodies, float64 [F, N, 2] each, by name."""
         moved = dict(found)
         bodies = {b.name: b for b in self.bodies}
         for first, group in self._wholes.items():
@@ -185,7 +196,7 @@ def _body(layer: Layer) -> Body:
 
 
 def _wholes(layers: Sequence[Layer], motion: Motion, size: tuple[int, int]) -> dict[str, list[str]]:
-    """Layers that move as one, at least two, by the name of their first."""
+    """Groups of at least two layers that move as one: names of their layers, by the first name."""
     rest = motion.layers.get("*")
     found: dict[str, list[str]] = {}
     kinds: list[LayerMotion] = []
@@ -202,7 +213,12 @@ def _wholes(layers: Sequence[Layer], motion: Motion, size: tuple[int, int]) -> d
 
 
 def amplitude(image: Pictured, frames: int = 24) -> float:
-    """Mean displacement of the nodes that move, over the timeline, in canvas pixels."""
+    """Mean displacement by the motion of a picture, in canvas pixels.
+
+    Args:
+        image: The picture; without a motion the result is 0.
+        frames: Number of times, evenly over the timeline, that are averaged.
+    """
     picture = image.picture
     if picture.timeline is None:
         return 0.0

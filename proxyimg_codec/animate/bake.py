@@ -1,4 +1,4 @@
-"""From simulated frames to tracks that a file can hold."""
+"""Baking of simulated frames to tracks, as a file holds them."""
 
 from __future__ import annotations
 
@@ -13,34 +13,39 @@ from ..geometry.track import CURVE_BITS, SHAPE_MAX, SUM, Timeline, Track
 Floats = NDArray[np.float64]
 
 UNIT = 2
-"""Shapes are multiples of 2**-UNIT px."""
+"""Unit of shapes: displacements are multiples of 2**-UNIT canvas pixel."""
 
 TOLERANCE = 0.25
-"""What tracks may deviate from the frames, in px: root mean square over nodes, in any frame."""
+"""Largest deviation of a frame, in canvas pixels: root mean square over the nodes of a layer."""
 
 GROWTH = 1.25
-"""Intervals are tried in such steps, from a few to one a frame."""
+"""Factor by which the number of intervals grows from one attempt to the next."""
 
 MODES = 24
-"""Most shapes of a layer."""
+"""Most shapes of a layer that are used."""
 
 
 def bake(
     frames: Sequence[Floats], *, fps: int, loop: bool, script: str = "",
     tolerance: float = TOLERANCE,
 ) -> tuple[Timeline, list[Track]]:  # fmt: skip
-    """Tracks with as few coefficients and shapes as are within `tolerance` of the frames.
+    """Finds tracks with few coefficients and shapes that are within a tolerance of frames.
 
     Args:
-        frames: For each layer float64 [F, N, 2] displacements in canvas pixels, F the same.
-        fps: Frames a second; frame k stands at k / fps.
-        loop: Whether frame F would be frame 0 again.
-        script: What the frames were made from, JSON.
-        tolerance: Root mean square over the nodes of a layer in px that no frame exceeds, where
-            one interval a frame and `MODES` shapes allow that.
+        frames: For each layer float64 [F, N, 2] displacements in canvas pixels; F is the same for
+            all.
+        fps: Frames per second; frame k is at k / fps seconds.
+        loop: Whether frame 0 follows the last one.
+        script: Motion that the frames were made from, as JSON.
+        tolerance: Largest deviation of a frame in canvas pixels, as root mean square over the nodes
+            of a layer. It may be exceeded if one interval per frame and `MODES` shapes do not
+            suffice.
+
+    Returns:
+        The timeline, and the track of each layer.
 
     Raises:
-        LimitError: Nodes are displaced further than a file can hold.
+        LimitError: Nodes are displaced farther than a file can hold.
     """
     wanted = [f.reshape(len(f), -1) for f in frames]
     if max(np.abs(w).max(initial=0) for w in wanted) * (1 << UNIT) >= SHAPE_MAX // 4:
@@ -71,7 +76,7 @@ def bake(
 
 
 def _basis(timeline: Timeline, count: int) -> Floats:
-    """The weight of each coefficient in each frame, [F, K]."""
+    """Weight of each coefficient in each of `count` frames, float64 [F, K]."""
     out = np.zeros((count, timeline.coefficients))
     for k in range(count):
         index, weight = timeline.taps(k / timeline.fps)
@@ -80,15 +85,20 @@ def _basis(timeline: Timeline, count: int) -> Floats:
 
 
 def _solved(basis: Floats, wanted: Floats) -> Floats:
-    """Coefficients [K, M] that come nearest to frames [F, M], least bent where frames are few."""
+    """Coefficients float64 [K, M] with the least squared error, and slightly smoothed.
+
+    Args:
+        basis: float64 [F, K] weights of coefficients.
+        wanted: float64 [F, M] coordinates of frames.
+    """
     bend = np.diff(np.eye(basis.shape[1]), 2, axis=0)
     normal = basis.T @ basis + 1e-6 * bend.T @ bend + 1e-9 * np.eye(basis.shape[1])
     return np.asarray(np.linalg.solve(normal, basis.T @ wanted))
 
 
 def _components(coefficients: Floats) -> Floats:
-    """Principal components of coefficients [K, 2 N], strongest first: [`MODES`, K]."""
-    # Of the K by K products, as there are far more nodes than coefficients.
+    """Principal components float64 [MODES, K] of coefficients [K, 2 N], strongest first."""
+    # From the K x K matrix of products, as there are far more nodes than coefficients.
     power, vectors = np.linalg.eigh(coefficients @ coefficients.T)
     curves = np.zeros((MODES, len(coefficients)))
     strongest = vectors.T[::-1][:MODES]
@@ -98,9 +108,17 @@ def _components(coefficients: Floats) -> Floats:
 
 
 def _track(basis: Floats, components: Floats, wanted: Floats, modes: int) -> Track:
-    """The track whose curves are the first of some components."""
+    """Makes the track whose curves are the first `modes` components [MODES, K].
+
+    Args:
+        basis: float64 [F, K] weights of coefficients.
+        components: float64 [MODES, K] principal components.
+        wanted: float64 [F, 2 N] coordinates of frames, which decide the shapes.
+        modes: Number of curves and shapes.
+    """
     curves = components[:modes]
-    # The sign of a component is arbitrary: the largest coefficient decides, on every machine.
+    # The sign of a component is arbitrary. Dividing by its largest coefficient makes it the same on
+    # every machine.
     peak = np.take_along_axis(curves, np.abs(curves).argmax(1)[:, None], 1)
     rounded = np.rint(curves / np.where(peak == 0, 1, peak) * (1 << CURVE_BITS))
     shown = basis @ rounded.T / (1 << CURVE_BITS)
@@ -112,11 +130,11 @@ def _track(basis: Floats, components: Floats, wanted: Floats, modes: int) -> Tra
 
 
 def _shown(basis: Floats, track: Track) -> Floats:
-    """The frames [F, 2 N] of a track."""
+    """Frames float64 [F, 2 N] of a track."""
     curves = basis @ track.curves.T / (1 << CURVE_BITS)
     return np.asarray(curves @ track.shapes.reshape(len(track.shapes), -1) / (1 << UNIT))
 
 
 def _worst(shown: Floats, wanted: Floats) -> float:
-    """Root mean square deviation over nodes of the worst frame."""
+    """Largest deviation of a frame: root mean square over the nodes, in canvas pixels."""
     return float(np.sqrt(2 * ((shown - wanted) ** 2).mean(1).max(initial=0)))

@@ -1,4 +1,4 @@
-"""A layer as the simulation sees it: its mesh at rest, and choosing nodes of it."""
+"""Body: a layer, or a union of layers, in the simulation; its mesh at rest, and choice of nodes."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 BAND = 0.06
-"""Share of the box of a layer that its top, bottom, left or right is."""
+"""Width of the band of nodes at the top, bottom, left or right, relative to the side of the box."""
 
 MIDDLE = 0.1
-"""Radius of a layer's middle, relative to its diagonal."""
+"""Radius of the centre of a body, relative to its diagonal."""
 
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A layer with its mesh at rest.
+    """Body of the simulation, with its mesh at rest.
 
     Attributes:
-        name: The layer's.
-        nodes: float64 [N, 2] in canvas pixels.
-        faces: int [F, 3].
+        name: Name of the layer; of a union of layers, that of the first.
+        nodes: float64 [N, 2] rest positions of the nodes in canvas pixels.
+        faces: int [F, 3] nodes of the triangles.
     """
 
     name: str
@@ -38,18 +38,22 @@ class Body:
 
     @cached_property
     def diagonal(self) -> float:
-        """Of the box round the nodes, in pixels."""
+        """Diagonal of the box around the nodes in canvas pixels."""
         return float(np.hypot(*np.ptp(self.nodes, axis=0)))
 
     @cached_property
     def areas(self) -> Real:
-        """Signed areas of the faces [F] in square pixels."""
+        """Signed areas of the faces, float64 [F], in square pixels."""
         (ax, ay), (bx, by), (cx, cy) = self.nodes[self.faces].transpose(1, 2, 0)
         return np.asarray((bx - ax) * (cy - ay) - (by - ay) * (cx - ax)) / 2
 
     @cached_property
     def sides(self) -> tuple[Index, Index, Index]:
-        """Edges [E, 2] with the smaller node first, the edge [3F] of each side, and its face."""
+        """Edges and sides of faces.
+
+        int64 [E, 2] edges, each with the smaller node first; then for each of the 3 F sides its
+        edge, int64 [3F], and its face, int64 [3F].
+        """
         sides = np.concatenate(
             [self.faces[:, [0, 1]], self.faces[:, [1, 2]], self.faces[:, [2, 0]]]
         )
@@ -59,26 +63,30 @@ class Body:
 
     @cached_property
     def rim(self) -> Index:
-        """Edges [E, 2] that belong to one face."""
+        """Edges that belong to a single face, int64 [E, 2]."""
         edges, number, _ = self.sides
         return np.asarray(edges[np.bincount(number, minlength=len(edges)) == 1])
 
     @cached_property
     def loose(self) -> Mask:
-        """Which nodes belong to no face [N]."""
+        """Mask of the nodes that belong to no face, bool [N]."""
         free = np.ones(len(self.nodes), bool)
         free[self.faces.ravel()] = False
         return free
 
     @cached_property
     def nearest(self) -> Index:
-        """For each of the loose nodes the nearest node that belongs to a face."""
+        """For each loose node, the nearest node that belongs to a face; int64 [loose nodes]."""
         firm = np.flatnonzero(~self.loose)
         away = self.nodes[self.loose][:, None] - self.nodes[firm]
         return np.asarray(firm[(away**2).sum(2).argmin(1)]) if len(firm) else firm
 
     def bends(self) -> tuple[Index, Index]:
-        """Far corners [B, 2] of adjacent faces, and those faces [B, 2]."""
+        """Pairs of faces with a common edge.
+
+        Returns:
+            int64 [B, 2] corners of the two faces that are not on the edge, and int64 [B, 2] faces.
+        """
         _, number, face = self.sides
         far = self.faces[:, [2, 0, 1]].T.reshape(-1)
         order = np.argsort(number, kind="stable")
@@ -88,14 +96,17 @@ class Body:
         return far[pairs].astype(np.int64), face[pairs]
 
     def caught(self, spot: Spot, path: str) -> Mask:
-        """Which nodes [N] a spot catches.
+        """Finds the nodes in a spot.
 
         Args:
-            spot: A side, a disc or a rectangle.
-            path: Where the motion says so, for the error.
+            spot: A side, the border, the centre, a disc or a rectangle.
+            path: Place of the spot in the motion, for error messages.
+
+        Returns:
+            bool [N], True for nodes in the spot.
 
         Raises:
-            UsageError: It catches none.
+            UsageError: No node is in the disc or rectangle.
         """
         low, high = self.nodes.min(0), self.nodes.max(0)
         x, y = self.nodes.T
@@ -127,10 +138,18 @@ class Body:
         return np.asarray(sides[spot])
 
     def within(self, at: tuple[float, float], radius: float, path: str) -> Mask:
-        """Which nodes [N] lie in a disc.
+        """Finds the nodes in a disc.
+
+        Args:
+            at: Centre in canvas pixels.
+            radius: Radius in canvas pixels.
+            path: Place of the disc in the motion, for error messages.
+
+        Returns:
+            bool [N], True for nodes in the disc.
 
         Raises:
-            UsageError: None does.
+            UsageError: No node is in the disc.
         """
         away = np.hypot(*(self.nodes - at).T)
         if away.min() > radius:
@@ -141,7 +160,7 @@ class Body:
         return np.asarray(away <= radius)
 
     def distance(self, some: Mask) -> Real:
-        """How far each node is from the nearest of `some` [N], in pixels [N]."""
+        """Distance in pixels, float64 [N], of nodes from the nearest one of `some`, bool [N]."""
         nearest = np.full(len(self.nodes), np.inf)
         for x, y in self.nodes[some].tolist():
             square = (self.nodes[:, 0] - x) ** 2 + (self.nodes[:, 1] - y) ** 2
@@ -149,9 +168,16 @@ class Body:
         return np.asarray(np.sqrt(nearest))
 
     def holding(self, points: Real) -> tuple[Index, Real]:
-        """For each of `points` [n, 2] the face's nodes [n, 3] and weights [n, 3] that make it.
+        """Finds the faces that hold points.
 
-        A point outside the mesh takes the face that it is least far outside of.
+        A point outside the mesh takes the face with the largest least weight; some of its weights
+        are negative.
+
+        Args:
+            points: float64 [n, 2] points in canvas pixels.
+
+        Returns:
+            int64 [n, 3] nodes of the face of each point, and float64 [n, 3] barycentric weights.
         """
         faces = self.faces[np.abs(self.areas) > 0]
         a, b, c = self.nodes[faces].transpose(1, 0, 2)  # [F, 2]

@@ -1,4 +1,4 @@
-"""Collisions: with the edges of the canvas, with a floor, and between layers."""
+"""Collisions with the edges of the canvas, with a floor, and between layers."""
 
 from __future__ import annotations
 
@@ -11,22 +11,27 @@ Real = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 GRIP = 0.5
-"""Share of its way along a wall that a particle loses in a step in which it touches it."""
+"""Share of its movement along a wall that a particle loses in a step in which it touches it."""
 
 
 class Walls:
-    """Particles stay in a box each, and slow down where they touch its sides.
+    """Walls: each particle stays in a box of its own, and slows down where it touches its sides.
 
     Args:
-        low: Least x and y of each particle [2, P].
-        high: Greatest [2, P].
+        low: float64 [2, P] least x and y of each particle in pixels.
+        high: float64 [2, P] greatest x and y.
     """
 
     def __init__(self, low: Real, high: Real) -> None:
         self.low, self.high = low, high
 
     def project(self, x: Real, before: Real) -> None:
-        """Brings positions `x` [2, P] back, in place, that were at `before` [2, P]."""
+        """Moves particles back into their boxes.
+
+        Args:
+            x: float64 [2, P] positions; they are changed.
+            before: float64 [2, P] positions before the step.
+        """
         inside = np.clip(x, self.low, self.high)
         touching = (inside != x)[::-1]
         x[...] = inside
@@ -34,12 +39,15 @@ class Walls:
 
 
 class Outline:
-    """The outline of a layer for collisions: the edges of its mesh that belong to one triangle.
+    """Outline of a body for collisions: the edges of its mesh that belong to one triangle.
 
     Args:
-        part: The layer's particles.
-        edges: int64 [E, 2] particles, in the direction they have in their triangle.
-        nodes: Places at rest [2, P].
+        part: Particles of the body.
+        edges: int64 [E, 2] particles at the ends of the edges.
+        nodes: float64 [2, P] rest positions.
+
+    Attributes:
+        outside: bool [P], True for particles of other bodies that lie outside at rest.
     """
 
     def __init__(self, part: slice, edges: Index, nodes: Real) -> None:
@@ -49,7 +57,15 @@ class Outline:
 
 
 def inside(points: Real, edges: Real) -> NDArray[np.bool_]:
-    """Which points [2, P] edges [2, E, 2] surround, by the even-odd rule: bool [P]."""
+    """Finds the points that edges surround, by the even-odd rule.
+
+    Args:
+        points: float64 [2, P] points.
+        edges: float64 [2, E, 2] x of both ends of each edge, then y.
+
+    Returns:
+        bool [P].
+    """
     (ax, bx), (ay, by) = edges.transpose(0, 2, 1)[..., None]
     x, y = points
     crossed = (ay <= y) != (by <= y)
@@ -59,22 +75,22 @@ def inside(points: Real, edges: Real) -> NDArray[np.bool_]:
 
 
 class Layers:
-    """Particles of one layer that enter another are put back on its nearest edge.
+    """Collisions between bodies: a particle that enters another body is put on its nearest edge.
 
-    A particle that lies inside a layer at rest may be inside it at any time. The ends of an edge
-    move the other way, so that momentum stays; where several particles meet an edge in a step,
-    each goes a share of its way, and the rest in the steps after it.
+    A particle that lies inside a body at rest may be inside it at any time. The ends of the edge
+    move the other way, so that momentum is conserved. If several particles meet an edge in a step,
+    each goes a share of its way, and the rest in later steps.
 
     Args:
-        bodies: The outlines of all layers.
-        w: Inverse masses [P].
+        bodies: Outlines of all bodies.
+        w: float64 [P] inverse masses.
     """
 
     def __init__(self, bodies: Sequence[Outline], w: Real) -> None:
         self.bodies, self.w = bodies, w
 
     def project(self, x: Real) -> None:
-        """Moves positions `x` [2, P], in place."""
+        """Moves particles out of other bodies; `x` float64 [2, P] is changed."""
         boxes = [(x[:, b.part].min(1), x[:, b.part].max(1)) for b in self.bodies]
         for body, (low, high) in zip(self.bodies, boxes, strict=True):
             near = body.outside & ((x > low[:, None]) & (x < high[:, None])).all(0)
@@ -85,7 +101,7 @@ class Layers:
                 self._push(x, body.edges, at)
 
     def _push(self, x: Real, edges: Index, at: Index) -> None:
-        """Puts particles `at` [n] on the nearest of `edges` [E, 2]."""
+        """Moves each of the particles `at` [n] to the nearest of the edges [E, 2], and its ends."""
         a, b = x[:, edges[:, 0], None], x[:, edges[:, 1], None]
         along = b - a
         square = np.maximum((along**2).sum(0), 1e-30)

@@ -1,16 +1,16 @@
-"""XPBD constraints on the particles of all layers, solved by colour.
+"""XPBD constraints on the particles of all layers, solved colour after colour.
 
-A constraint C with compliance a (the inverse of a stiffness, so that its energy is C**2 / 2a) moves
-its particles of inverse masses w in one step of h seconds by
+A constraint C has a compliance a, the inverse of a stiffness, and the energy C**2 / 2a. In one step
+of h seconds it moves its particles of inverse masses w by
 
     dx_i = -w_i grad_i C * C / (sum_j w_j |grad_j C|**2 + a / h**2)
 
 (Macklin, Müller, Chentanez: XPBD, 2016, equations 17 and 18 with one iteration, whose multiplier
 starts at 0; Macklin et al.: Small steps in physics simulation, 2019). Constraints of one colour
-share no particle, so each colour is one vector operation; the colours follow one another as in the
+share no particle, so each colour is one vector operation. The colours follow one another as in the
 method of Gauss and Seidel (Müller et al.: Position based dynamics, 2007, section 3.4).
 
-Positions are float64 [2, P]: all x, then all y. A particle of inverse mass 0 is never moved.
+Positions are float64 [2, P] in pixels: all x, then all y. A particle of inverse mass 0 never moves.
 """
 
 from __future__ import annotations
@@ -26,36 +26,37 @@ Real = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 RESOLVED = 4.0
-"""Least ratio of a / h**2 to the sum of w |grad C|**2: one iteration meets a fifth of a constraint.
+"""Least ratio of a / h**2 to the sum of w |grad C|**2: one iteration corrects a fifth of C.
 
-What is stiffer cannot be resolved in a step, so it is softened; more steps make it stiffer. One
-sweep over stiffer constraints would put less energy into them than C**2 / 2a says they hold.
+Stiffer constraints cannot be resolved in a step, so they are softened; with more steps they become
+stiffer. A single iteration over stiffer ones would put less energy into them than C**2 / 2a.
 """
 
 HELD = 0.1
-"""The same of attachments, which are few: gaps would be seen."""
+"""Least ratio for attachments; it is smaller because gaps would be visible, and they are few."""
 
 TINY = 1e-30
+"""Number that keeps divisors from being 0."""
 
 
 class Constraint(Protocol):
-    """What moves particles back."""
+    """Constraint on particles."""
 
     def project(self, x: Real) -> None:
-        """Moves the particles `x` [2, P], in place, by one step of the method."""
+        """Moves the particles at `x`, float64 [2, P], by one iteration, in place."""
 
     def energy(self, x: Real) -> float:
-        """The elastic energy that is stored in positions `x` [2, P]."""
+        """Elastic energy at the positions `x`, float64 [2, P]."""
 
 
 def colours(members: Index) -> Index:
-    """Colours constraints so that no two of a colour share a particle; greedy, in order.
+    """Colours constraints greedily, so that no two of one colour share a particle.
 
     Args:
         members: int64 [C, k] particles of each constraint.
 
     Returns:
-        int64 [C], counted from 0.
+        int64 [C] colours, counted from 0.
     """
     taken = [0] * (int(members.max(initial=-1)) + 1)
     result = np.empty(len(members), np.int64)
@@ -71,7 +72,7 @@ def colours(members: Index) -> Index:
 
 
 def _by_colour(members: Index, w: Real) -> Iterator[Index]:
-    """Numbers of the constraints of each colour; those that cannot move anything are left out."""
+    """Yields the numbers of the constraints of each colour that have a particle that can move."""
     live = np.flatnonzero((w[members] > 0).any(1))
     colour = colours(members[live])
     for c in range(int(colour.max(initial=-1)) + 1):
@@ -79,17 +80,27 @@ def _by_colour(members: Index, w: Real) -> Iterator[Index]:
 
 
 def _compliance(stiffness: Real, weight: Real, step: float, least: float = RESOLVED) -> Real:
-    """Compliances a [C], at least `least` * h**2 * weight: the sum of w |grad C|**2 [C]."""
+    """Compliances of constraints, at least `least` * h**2 * weight.
+
+    Args:
+        stiffness: float64 [C] inverses of the wanted compliances.
+        weight: float64 [C] sums of w |grad C|**2.
+        step: h in seconds.
+        least: Least ratio, as for `RESOLVED`.
+
+    Returns:
+        float64 [C].
+    """
     return np.maximum(1 / np.maximum(stiffness, TINY), least * step**2 * weight)
 
 
 def _places(members: Index, count: int) -> Index:
-    """Where the coordinates of particles [n, k] stand in a flat `x`: int64 [k, 2, n]."""
+    """Indices int64 [k, 2, n] of the coordinates of particles [n, k] in flattened positions."""
     return np.ascontiguousarray(np.stack([members.T, members.T + count], axis=1))
 
 
 def _scratch(sizes: Sequence[int], *shapes: tuple[int, ...]) -> list[list[Real]]:
-    """Arrays of each of `shapes` + (n,) for each n of `sizes`, which share their memory."""
+    """For each n of `sizes`, work arrays of `shapes` + (n,); those of all sizes share memory."""
     pools = [np.empty(math.prod(shape) * max(sizes, default=0)) for shape in shapes]
     return [
         [p[: math.prod(s) * n].reshape(*s, n) for p, s in zip(pools, shapes, strict=True)]
@@ -98,16 +109,16 @@ def _scratch(sizes: Sequence[int], *shapes: tuple[int, ...]) -> list[list[Real]]
 
 
 class Distances:
-    """Pairs of particles keep their distance: C = |x_i - x_j| - d.
+    """Constraints that keep the distance of pairs of particles: C = |x_i - x_j| - d.
 
-    Along edges this resists stretching; between the far corners of two triangles with a common
-    edge it resists bending.
+    Along edges they resist stretching. Between the far corners of two triangles with a common edge
+    they resist bending.
 
     Args:
-        pairs: int64 [C, 2].
-        rest: Distances d [C].
-        stiffness: 1 / compliance [C].
-        w: Inverse masses [P].
+        pairs: int64 [C, 2] particles of each pair.
+        rest: float64 [C] distances d at rest in pixels.
+        stiffness: float64 [C] inverses of the compliances.
+        w: float64 [P] inverse masses.
         step: h in seconds.
     """
 
@@ -122,7 +133,7 @@ class Distances:
         self.scratch = _scratch([len(g[1]) for g in self.groups], (2, 2), (2, 2), (2,), (2,), ())
 
     def project(self, x: Real) -> None:
-        """Moves the particles `x` [2, P], in place, by one step of the method."""
+        """Moves the particles at `x`, float64 [2, P], by one iteration, in place."""
         flat = x.reshape(-1)
         for (places, rest, scale, _), work in zip(self.groups, self.scratch, strict=True):
             ends, change, apart, square, length = work
@@ -140,7 +151,7 @@ class Distances:
             flat[places] = ends
 
     def energy(self, x: Real) -> float:
-        """The elastic energy that is stored in positions `x` [2, P]."""
+        """Elastic energy at the positions `x`, float64 [2, P]."""
         total = 0.0
         for places, rest, _, stiffness in self.groups:
             (ax, ay), (bx, by) = x.reshape(-1)[places]
@@ -149,17 +160,17 @@ class Distances:
 
 
 class Areas:
-    """Triangles keep their signed area: C = (b - a) x (c - a) - 2A.
+    """Constraints that keep the signed area of triangles: C = (b - a) x (c - a) - 2A.
 
-    The gradient at a corner is the opposite edge, turned by a quarter.
+    The gradient at a corner is the opposite edge, turned by 90 degrees.
 
     Args:
-        faces: int64 [C, 3].
-        rest: Twice the signed areas, 2A [C].
-        stiffness: 1 / compliance [C].
-        w: Inverse masses [P].
+        faces: int64 [C, 3] particles of each triangle.
+        rest: float64 [C] twice the signed areas at rest, 2A, in square pixels.
+        stiffness: float64 [C] inverses of the compliances.
+        w: float64 [P] inverse masses.
         step: h in seconds.
-        nodes: Positions at rest [2, P].
+        nodes: float64 [2, P] rest positions.
     """
 
     def __init__(
@@ -170,7 +181,7 @@ class Areas:
         compliance = _compliance(stiffness, (w[faces] * opposite).sum(1), step)
         self.groups = []
         for at in _by_colour(faces, w):
-            # Corners a, b, c, a, b: their differences are the edges opposite a, b and c.
+            # Differences of the corners a, b, c, a, b are the edges opposite a, b and c.
             places = _places(faces[at][:, [0, 1, 2, 0, 1]], len(w))
             soft = compliance[at] / step**2 + TINY
             weight = np.ascontiguousarray(w[faces[at]].T)
@@ -179,7 +190,7 @@ class Areas:
         self.scratch = _scratch(sizes, (5, 2), (3, 2), (3, 2), (3,), (), ())
 
     def project(self, x: Real) -> None:
-        """Moves the particles `x` [2, P], in place, by one step of the method."""
+        """Moves the particles at `x`, float64 [2, P], by one iteration, in place."""
         flat = x.reshape(-1)
         for (places, rest, weight, soft, _), work in zip(self.groups, self.scratch, strict=True):
             corners, edges, square, factor, area, sum_ = work
@@ -201,7 +212,7 @@ class Areas:
             flat[places[:3]] = corners[:3]
 
     def energy(self, x: Real) -> float:
-        """The elastic energy that is stored in positions `x` [2, P]."""
+        """Elastic energy at the positions `x`, float64 [2, P]."""
         total = 0.0
         for places, rest, _, _, stiffness in self.groups:
             (ax, ay), (bx, by), (cx, cy) = x.reshape(-1)[places[:3]]
@@ -211,13 +222,13 @@ class Areas:
 
 
 class Attachments:
-    """Particles stay at points of triangles: C = x_p - sum_k b_k x_k, in x and in y.
+    """Constraints that keep particles at points of triangles: C = x_p - sum_k b_k x_k, in x and y.
 
     Args:
-        members: int64 [C, 4] the particle p and the three corners.
-        weights: Barycentric weights b [C, 3].
-        stiffness: 1 / compliance [C].
-        w: Inverse masses [P].
+        members: int64 [C, 4] the particle p and the three corners of the triangle.
+        weights: float64 [C, 3] barycentric weights b.
+        stiffness: float64 [C] inverses of the compliances.
+        w: float64 [P] inverse masses.
         step: h in seconds.
     """
 
@@ -234,7 +245,7 @@ class Attachments:
         ]
 
     def project(self, x: Real) -> None:
-        """Moves the particles `x` [2, P], in place, by one step of the method."""
+        """Moves the particles at `x`, float64 [2, P], by one iteration, in place."""
         flat = x.reshape(-1)
         for places, gradient, scale, _ in self.groups:
             points = flat[places]  # [4, 2, n]
@@ -242,7 +253,7 @@ class Attachments:
             flat[places] = points - scale[:, None] * apart
 
     def energy(self, x: Real) -> float:
-        """The elastic energy that is stored in positions `x` [2, P]."""
+        """Elastic energy at the positions `x`, float64 [2, P]."""
         total = 0.0
         for places, gradient, _, stiffness in self.groups:
             apart = (x.reshape(-1)[places] * gradient[:, None]).sum(0)
@@ -251,24 +262,25 @@ class Attachments:
 
 
 class Shape:
-    """The particles of a layer return to the best rigid fit of their places at rest.
+    """Constraint that pulls the particles of a body to the best rigid fit of their rest positions.
 
-    Each is pulled to its goal g (Müller et al.: Meshless deformations based on shape matching,
-    2005, equations 6 to 8; the rotation is exact in the plane), C = |x - g| with compliance
-    w / k**2, where k is 2 pi times a frequency. Momentum stays, and so does spin if the fit turns.
+    Each particle has a goal g in the fit (Müller et al.: Meshless deformations based on shape
+    matching, 2005, equations 6 to 8; the rotation is exact in the plane): C = |x - g| with
+    compliance w / k**2, where k is 2 pi times a frequency. It conserves momentum, and angular
+    momentum too if the fit turns.
 
     Args:
-        part: The particles of the layer.
-        nodes: Positions at rest [2, P].
-        w: Inverse masses [P].
-        mass: Masses [P] that weigh the fit, those of pinned particles included.
-        frequency: In Hz.
+        part: Particles of the body.
+        nodes: float64 [2, P] rest positions.
+        w: float64 [P] inverse masses.
+        mass: float64 [P] masses that weight the fit, also those of pinned particles.
+        frequency: Frequency in Hz with which particles return.
         upright: Whether the fit moves but does not turn.
         step: h in seconds.
     """
 
     FIXED = 1e3
-    """How much heavier particles of inverse mass 0 weigh in the fit: it turns about them."""
+    """Factor of the weight, in the fit, of particles with inverse mass 0: it turns about them."""
 
     def __init__(
         self,
@@ -290,7 +302,7 @@ class Shape:
         self.pull = np.where(w[part] > 0, pull / (1 + pull), 0)
 
     def goal(self, x: Real) -> Real:
-        """Where the rigid fit to positions `x` [2, P] has the particles of the layer [2, n]."""
+        """Goals float64 [2, n] of the particles of the body, in the rigid fit to `x` [2, P]."""
         x = x[:, self.part]
         centre = np.einsum("ci,i->c", x, self.share)[:, None]
         if self.upright:
@@ -302,13 +314,13 @@ class Shape:
         return np.asarray(turn @ self.rest + centre)
 
     def project(self, x: Real) -> None:
-        """Moves the particles `x` [2, P], in place, by one step of the method."""
+        """Moves the particles at `x`, float64 [2, P], by one iteration, in place."""
         change = self.goal(x)
         change -= x[:, self.part]
         change *= self.pull
         x[:, self.part] += change
 
     def energy(self, x: Real) -> float:
-        """The elastic energy that is stored in positions `x` [2, P]."""
+        """Elastic energy at the positions `x`, float64 [2, P]."""
         apart = ((x[:, self.part] - self.goal(x)) ** 2).sum(0)
         return float((self.stiffness * apart).sum()) / 2

@@ -1,7 +1,7 @@
-"""Layers that move as one: what touches must not tear apart.
+"""Coupling of layers that move as one, so that layers that touch do not tear apart.
 
-A picture is often cut into layers that are parts of one thing, such as the colours of a character.
-Such layers are simulated as one body, the union of their shapes, and ride on its mesh.
+A picture often has layers that are parts of one thing, such as the colours of a character. Such
+layers are simulated as one body, the union of their shapes, and their nodes follow its mesh.
 """
 
 from __future__ import annotations
@@ -21,18 +21,22 @@ from .body import Body
 Size = tuple[int, int]
 
 NEAR = 2
-"""Layers touch if less than so many canvas pixels lie between them; on large canvases more."""
+"""Distance in cells below which layers touch; a cell is one canvas pixel, or more on large
+canvases."""
 
 LONGEST = 512
-"""Longest side in cells of the grid on which that is found."""
+"""Most cells along a side of the canvas."""
 
 
 def touching(layers: Sequence[Layer], size: Size) -> list[list[int]]:
-    """Numbers of layers that touch, at rest and directly or through others; in their order.
+    """Groups layers that touch at rest, directly or through others.
 
     Args:
-        layers: Any layers of a picture.
-        size: Width and height of its canvas.
+        layers: Some layers of a picture.
+        size: Width and height of its canvas in pixels.
+
+    Returns:
+        For each group the ascending numbers of its layers in `layers`.
     """
     masks = [_mask(v, size) for v in layers]
     group = list(range(len(layers)))
@@ -45,7 +49,7 @@ def touching(layers: Sequence[Layer], size: Size) -> list[list[int]]:
 
 
 def _mask(layer: Layer, size: Size) -> NDArray[np.bool_]:
-    """Cells [h, w] that a layer touches, or nearly so."""
+    """Mask of the cells that a layer touches, or that are next to such cells, bool [h, w]."""
     cell = max(-(-max(size) // LONGEST), 1)
     columns, rows = (-(-n // cell) for n in size)
     if layer.boundary is None:
@@ -65,13 +69,16 @@ def _mask(layer: Layer, size: Size) -> NDArray[np.bool_]:
 
 
 def united(name: str, layers: Sequence[Layer], size: Size, edge: float) -> Body:
-    """A body of the union of the shapes of layers.
+    """Makes a body of the union of the shapes of layers at rest.
 
     Args:
-        name: Of the body.
+        name: Name of the body.
         layers: Layers of a picture.
-        size: Width and height of its canvas.
-        edge: Length of edges relative to the diagonal.
+        size: Width and height of its canvas in pixels.
+        edge: Target edge length relative to the diagonal of the union, 0.01..1.
+
+    Raises:
+        UsageError: `edge` is out of range.
     """
     shapes = [v.boundary for v in layers]
     if any(shape is None for shape in shapes):
@@ -87,6 +94,15 @@ def united(name: str, layers: Sequence[Layer], size: Size, edge: float) -> Body:
 def ridden(
     body: Body, moved: NDArray[np.float64], nodes: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Displacements [F, n, 2] of points [n, 2] that ride on a body whose nodes move [F, N, 2]."""
+    """Displacements of points that follow a body.
+
+    Args:
+        body: The body.
+        moved: float64 [F, N, 2] displacements of its nodes in F frames.
+        nodes: float64 [n, 2] points at rest in canvas pixels.
+
+    Returns:
+        float64 [F, n, 2].
+    """
     corners, weights = body.holding(nodes)
     return np.asarray((moved[:, corners] * weights[..., None]).sum(2))

@@ -1,4 +1,4 @@
-"""What the material of a layer makes of its mesh: masses, springs and stiff triangles."""
+"""Masses, springs and stiff triangles of a mesh, from the material of its layer."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ Real = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 LIGHTEST = 0.05
-"""Least mass of a node relative to the mean of its layer."""
+"""Least mass of a node, relative to the mean of its body."""
 
 THINNEST = 1e-4
-"""Triangles of less area relative to the square of their longest side keep no area."""
+"""Least area, relative to the square of the longest side, of triangles that resist its change."""
 
 
 def masses(body: Body, layer: LayerMotion) -> Real:
-    """Masses of the nodes [N]: each has a third of the triangles round it."""
+    """Masses of the nodes, float64 [N]: a third of each triangle around a node."""
     shares = np.repeat(np.abs(body.areas) / 3, 3)
     mass = np.bincount(body.faces.ravel(), shares, len(body.nodes))
     mass = np.maximum(mass, LIGHTEST * mass[~body.loose].mean())
@@ -27,10 +27,18 @@ def masses(body: Body, layer: LayerMotion) -> Real:
 
 
 def springs(body: Body, layer: LayerMotion) -> tuple[Index, Real, Real]:
-    """Pairs of nodes [S, 2] along edges and across them, their distances and stiffnesses [S].
+    """Makes springs along edges, and across them between the far corners of adjacent triangles.
 
-    Springs of stiffness E * (area on both sides) / length**2 make a sheet whose modulus is about E
-    of a lattice of equilateral triangles, however fine it is. Springs without length are left out.
+    In a lattice of equilateral triangles, springs of stiffness E * (area on both sides) / length**2
+    make a sheet of modulus about E, however fine the lattice is. Springs of length 0 are left out.
+
+    Args:
+        body: The body.
+        layer: Motion of the body, for its material.
+
+    Returns:
+        int64 [S, 2] nodes at the ends, float64 [S] lengths at rest in pixels, and float64 [S]
+        stiffnesses.
     """
     edges, number, face = body.sides
     bends, beside = body.bends()
@@ -46,9 +54,17 @@ def springs(body: Body, layer: LayerMotion) -> tuple[Index, Real, Real]:
 
 
 def triangles(body: Body, layer: LayerMotion) -> tuple[Index, Real, Real]:
-    """Faces [T, 3] that keep their area, twice that area and the stiffness of twice it [T].
+    """Makes triangles that resist a change of area; slivers are left out.
 
-    The energy is K (A - A0)**2 / 2 A0, whose modulus is K. Slivers are left out.
+    The energy of a triangle is K (A - A0)**2 / 2 A0 with the modulus K.
+
+    Args:
+        body: The body.
+        layer: Motion of the body, for its material.
+
+    Returns:
+        int64 [T, 3] nodes, float64 [T] twice the signed areas at rest, and float64 [T] stiffnesses
+        against a change of twice the area.
     """
     area = np.abs(body.areas)
     corners = body.nodes[body.faces]
@@ -59,5 +75,5 @@ def triangles(body: Body, layer: LayerMotion) -> tuple[Index, Real, Real]:
 
 
 def _modulus(body: Body, layer: LayerMotion) -> float:
-    """The modulus that a frequency of 1 Hz means; see `Material`."""
+    """Modulus that corresponds to a frequency of 1 Hz; see `Material`."""
     return layer.material.density * layer.mass * (2 * body.diagonal) ** 2

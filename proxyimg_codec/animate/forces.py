@@ -1,4 +1,4 @@
-"""Forces: a coherent wind, impulses, and curves of handles; all may repeat with a loop."""
+"""Forces: coherent wind, impulses, and curves of handles; all may repeat with a loop."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ OCTAVES, WAVES = 3, 4
 """Octaves of the wind, and plane waves in each."""
 
 TREMOR = 77
-"""Tells the random numbers of the wind from those that other things may draw of the same seed."""
+"""Second part of the seed of the wind, so that other uses of the seed draw other numbers."""
 
 
 class Wind:
-    """A wind whose gusts travel along it: acceleration of particles at their places at rest.
+    """Wind with gusts that travel along it, as acceleration of particles at their rest positions.
 
-    Coherent noise as a sum of plane waves: octave o has waves of about scale / 2**o pixels and
-    frequency * 2**o Hz, half as strong as those of the octave before, in directions near that of
-    the wind. Where the motion loops, all frequencies are multiples of 1 / period. Each component
-    of a gust has a root mean square of 1.
+    Gusts are coherent noise, a sum of plane waves in directions near that of the wind. Waves of
+    octave o have a length of about scale / 2**o pixels and a frequency of about frequency * 2**o
+    Hz, and are half as strong as those of the octave before. If the motion loops, all frequencies
+    are multiples of 1 / period. Each component of a gust has a root mean square of 1.
 
     Args:
-        wind: What the motion says.
-        nodes: Places at rest in pixels [2, P].
-        response: Acceleration by a wind of strength 1, in pixels a second squared [P].
-        seed: Of the random numbers.
-        period: After how many seconds the wind repeats, or None.
+        wind: Wind of the motion.
+        nodes: float64 [2, P] rest positions in pixels.
+        response: float64 [P] acceleration by a wind of strength 1, in pixels per second squared.
+        seed: Seed of the random numbers.
+        period: Seconds after which the wind repeats; None if it does not.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class Wind:
         self.steady = 1 - wind.gust
 
     def at(self, time: float) -> Real:
-        """Acceleration [2, P] in pixels a second squared at a time in seconds."""
+        """Acceleration at a time in seconds, float64 [2, P] in pixels per second squared."""
         swing, late = self.turn * time, self.turn * time + self.lag
         along = [*(self.along * np.cos(swing)), *(self.along * np.sin(swing)), self.steady]
         aside = [*(self.aside * np.cos(late)), *(self.aside * np.sin(late)), 0.0]
@@ -69,9 +69,15 @@ class Wind:
 
 
 def falloff(nodes: Real, at: tuple[float, float] | None, radius: float | None) -> Real:
-    """How much of an impulse each of the nodes [N, 2] takes: 1 at its centre, 0 at its radius [N].
+    """Share of an impulse that each node takes: 1 at the centre, 0 from the radius on.
 
-    Without a centre it takes hold of all of them.
+    Args:
+        nodes: float64 [N, 2] rest positions.
+        at: Centre of the impulse; None for the same impulse everywhere.
+        radius: Radius of the impulse; None for the same impulse everywhere.
+
+    Returns:
+        float64 [N] in 0..1.
     """
     if at is None or radius is None:
         return np.ones(len(nodes))
@@ -80,11 +86,11 @@ def falloff(nodes: Real, at: tuple[float, float] | None, radius: float | None) -
 
 
 class Curve:
-    """Offset and scale of a handle over time.
+    """Curve of a handle: its offset and scale over time.
 
     Args:
-        handle: What the motion says.
-        period: After how many seconds it repeats, or None.
+        handle: Handle of the motion.
+        period: Seconds after which the curve repeats; None if it does not.
     """
 
     def __init__(self, handle: motion_types.Handle, period: float | None) -> None:
@@ -97,7 +103,7 @@ class Curve:
             self.values = np.concatenate([self.values, self.values[:1]])
 
     def at(self, time: float) -> tuple[Real, float]:
-        """Offset [2] in pixels and scale at a time in seconds."""
+        """Offset float64 [2] in pixels, and scale, at a time in seconds."""
         if self.period is not None:
             time = self.times[0] + (time - self.times[0]) % self.period
         after = int(np.searchsorted(self.times, time, side="right"))

@@ -1,7 +1,7 @@
-"""Materials: how stiff, heavy and airy a layer is.
+"""Materials: stiffness, density and air resistance of layers.
 
-Stiffness is stated as a frequency, so that a material behaves alike at every size of a layer, at
-every resolution of its mesh, and at every step in time.
+Stiffness is stated as a frequency. So a material behaves alike at every size of a layer, at every
+resolution of its mesh, and with every time step.
 """
 
 from __future__ import annotations
@@ -11,20 +11,21 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Material:
-    """What a layer is made of.
+    """Material of a layer.
 
-    The first three frequencies, in Hz, are those of the slowest standing wave f = c / 2L in a bar
-    as long as the diagonal L of the layer, where c is the speed of the waves that one kind of
-    stiffness alone would carry: the modulus is density * (2 L f)**2. 0 leaves the stiffness out.
+    The first three attributes are frequencies in Hz, of the slowest standing wave f = c / 2L in a
+    bar as long as the diagonal L of the layer. Here c is the speed of waves that this kind of
+    stiffness alone would carry; its modulus is density * (2 L f)**2. With 0 there is no such
+    stiffness.
 
     Attributes:
         stretch: Resistance of edges to a change of length.
         area: Resistance of triangles to a change of area.
         bend: Resistance of two adjacent triangles to a change of the distance of their far corners.
-        shape: Frequency in Hz with which a node that left the best rigid fit of its layer returns.
-        drag: Rate at which still air takes speed away, 1/s.
-        density: Mass of a square pixel; it matters only where layers meet.
-        wind: Acceleration by a wind of strength 1, in diagonals of the layer a second squared.
+        shape: Frequency in Hz with which a node returns to the best rigid fit of its layer.
+        drag: Rate at which still air slows the layer down, in 1/s.
+        density: Mass of a square pixel; it only matters if layers meet.
+        wind: Acceleration by a wind of strength 1, in diagonals of the layer per second squared.
     """
 
     stretch: float
@@ -44,4 +45,4 @@ MATERIALS = {
     "flame": Material(0.9, 1.5, 0.4, 1.0, 2.0, 0.2, 2.0),
     "water": Material(0.6, 4.0, 0.3, 0.8, 0.8, 1.0, 1.0),
 }
-"""The materials that a motion can call by name."""
+"""Materials that a motion can use by name."""

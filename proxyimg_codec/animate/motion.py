@@ -1,6 +1,6 @@
-"""Motion as data: what moves in a picture, of what, driven by what; reads and writes JSON.
+"""Motion of a picture as data for the simulation, which is read from JSON and written as JSON.
 
-The JSON schema is `motion.schema.json` beside this module. Lengths are canvas pixels with y down,
+The JSON Schema is `motion.schema.json` beside this module. Lengths are canvas pixels with y down,
 times are seconds.
 """
 
@@ -36,34 +36,35 @@ __all__ = ["PRESETS", "Attachment", "Box", "Collide", "Disc", "Handle", "Impulse
            "LayerMotion", "Motion", "Rectangle", "Spot", "Wind", "preset"]  # fmt: skip
 
 STEPS_MAX = 100_000
-"""Most steps of the simulation in the duration of a motion."""
+"""Most steps of simulation in the duration of a motion."""
 
 RATE_MIN = 96
-"""Steps a second that are made at least, however few frames a second are asked for."""
+"""Least number of steps of simulation per second, whatever the frame rate."""
 
 _FREE = Collide()
 
 
 @dataclass(frozen=True)
 class Motion:
-    """How a picture moves.
+    """Motion of a picture.
 
     Attributes:
-        layers: Layers by name; ``*`` is every layer that is not named.
-        duration: Length, or period of the loop, in seconds.
-        fps: Frames a second.
-        loop: Whether the last frame leads to the first; impulses and handles then repeat.
-        seed: Of the wind.
-        substeps: Steps of the simulation a frame, at least; 96 a second are always made.
-        gravity: Acceleration in pixels a second squared.
-        drag: Rate at which air takes speed away, 1/s, besides that of the materials.
-        wind: Or None.
-        collide: What collides.
-        attachments: What holds layers together.
-        together: Whether layers that touch, and are moved alike, move as one body.
+        layers: Motion of each layer, by name; ``*`` stands for every layer that is not named.
+        duration: Duration, or period of the loop, in seconds.
+        fps: Frames per second.
+        loop: Whether the first frame follows the last; impulses and handles then repeat.
+        seed: Seed of the wind.
+        substeps: Least number of steps of simulation per frame; there are at least 96 per second.
+        gravity: Acceleration in pixels per second squared.
+        drag: Rate at which air slows layers down, in 1/s, in addition to that of their materials.
+        wind: The wind, or None.
+        collide: Collisions to simulate.
+        attachments: Attachments of layers to each other.
+        together: Whether layers that touch, and have the same motion, move as one body.
 
     Raises:
-        UsageError: Something is out of range or makes no sense; the error names the place.
+        UsageError: A value is out of range, or values contradict each other; the message says the
+            place.
     """
 
     layers: Mapping[str, LayerMotion]
@@ -95,25 +96,25 @@ class Motion:
 
     @property
     def steps(self) -> int:
-        """Steps of the simulation in a frame."""
+        """Number of steps of simulation per frame."""
         return max(self.substeps, math.ceil(RATE_MIN / self.fps))
 
     @property
     def period(self) -> float:
-        """What the frames last, in seconds."""
+        """Duration of all frames in seconds."""
         return self.frames / self.fps
 
     @staticmethod
     def read(path: str | Path, boxes: Mapping[str, Box] | None = None) -> Motion:
-        """Reads a motion.json.
+        """Reads a motion file.
 
         Args:
-            path: The file.
-            boxes: As in `from_json`.
+            path: Path of the JSON file.
+            boxes: Bounds of the layers of the picture, as for `from_json`.
 
         Raises:
             InputError: The file cannot be read.
-            UsageError: It is no motion; the error names file and place.
+            UsageError: The file is not a valid motion; the message says file and place.
         """
         try:
             text = Path(path).read_text("utf-8")
@@ -126,15 +127,15 @@ class Motion:
 
     @staticmethod
     def from_json(text: str, boxes: Mapping[str, Box] | None = None) -> Motion:
-        """The motion that JSON describes.
+        """Makes the motion that JSON describes.
 
         Args:
-            text: JSON.
-            boxes: x0, y0, x1, y1 in pixels of the picture's layers by name; needed where the JSON
-                asks for a preset, which fills in whatever is not given.
+            text: The JSON.
+            boxes: Bounds x0, y0, x1, y1 of the layers of the picture in canvas pixels, by name;
+                needed if the JSON names a preset, which completes it.
 
         Raises:
-            UsageError: It is no JSON, or no motion; the error names the place.
+            UsageError: The text is not JSON, or not a valid motion; the message says the place.
         """
         try:
             values = json.loads(text)
@@ -147,7 +148,7 @@ class Motion:
         return _motion(values)
 
     def to_dict(self) -> dict[str, Any]:
-        """The motion as JSON values; what is as it is by default is left out."""
+        """Returns the motion as JSON values, without those that are defaults."""
         values = _pruned(self)
         named = {m: name for name, m in MATERIALS.items()}
         values["layers"] = {}
@@ -158,7 +159,7 @@ class Motion:
         return {"version": 1, **values}
 
     def to_json(self) -> str:
-        """The motion as JSON, which `from_json` reads."""
+        """Returns the motion as JSON that `from_json` reads."""
         return json.dumps(self.to_dict(), indent=1) + "\n"
 
 
@@ -172,19 +173,19 @@ def preset(
     seed: int = 0,
     pins: Sequence[Spot] | None = None,
 ) -> Motion:
-    """A motion that suits any picture.
+    """Makes the motion of a preset.
 
     Args:
-        name: One of `PRESETS`.
-        layers: x0, y0, x1, y1 in pixels of the boxes of the layers to move, by name.
-        duration: Length or period in seconds.
-        fps: Frames a second.
-        loop: Whether the last frame leads to the first.
-        seed: Of the wind.
-        pins: What stays, instead of what the preset pins.
+        name: Name of the preset, one of `PRESETS`.
+        layers: Bounds x0, y0, x1, y1 of the layers to move in canvas pixels, by name.
+        duration: Duration, or period of the loop, in seconds.
+        fps: Frames per second.
+        loop: Whether the first frame follows the last.
+        seed: Seed of the wind.
+        pins: Nodes that do not move, instead of those that the preset pins.
 
     Raises:
-        UsageError: There is no such preset, no layer, or a number is out of range.
+        UsageError: There is no such preset, no layer, or a value is out of range.
     """
     common = {"duration": duration, "fps": fps, "loop": loop, "seed": seed}
     values = presets.preset(name, layers, duration if duration > 0 else 1.0)
@@ -197,7 +198,7 @@ def preset(
 
 
 def _check_times(motion: Motion) -> None:
-    """Checks that all times lie within the duration, and that there are not too many steps."""
+    """Raises `UsageError` if times lie outside the duration, or there are too many steps."""
     total = motion.frames * motion.steps
     if total > STEPS_MAX:
         raise UsageError(
@@ -230,7 +231,7 @@ def _check_keys(keys: Sequence[Key], motion: Motion, path: str) -> None:
 
 
 def _motion(values: Mapping[str, Any]) -> Motion:
-    """The motion of checked JSON values."""
+    """Makes the motion of JSON values that match the schema."""
     kept = {k: _frozen(v) for k, v in values.items() if k not in ("version", "$schema")}
     for key in ("fps", "seed", "substeps"):  # JSON may write 24.0
         if key in kept:
@@ -271,14 +272,14 @@ def _spot(value: Any) -> Spot:
 
 
 def _frozen(value: Any) -> Any:
-    """JSON values with tuples for lists."""
+    """Replaces lists in JSON values by tuples."""
     if isinstance(value, list):
         return tuple(_frozen(v) for v in value)
     return {k: _frozen(v) for k, v in value.items()} if isinstance(value, dict) else value
 
 
 def _lists(value: Any) -> Any:
-    """JSON values with lists for tuples, without None."""
+    """Replaces tuples in values by lists, and leaves out None in dictionaries."""
     if isinstance(value, list | tuple):
         return [_lists(v) for v in value]
     if isinstance(value, dict):
@@ -287,7 +288,7 @@ def _lists(value: Any) -> Any:
 
 
 def _pruned(item: Any) -> dict[str, Any]:
-    """A dataclass as JSON values without what is as it is by default."""
+    """Converts a dataclass to JSON values, without those that are defaults."""
     plain = {f.name: f.default for f in fields(item)}
     kept = {k: v for k, v in asdict(item).items() if getattr(item, k) != plain[k]}
     pruned: dict[str, Any] = _lists(kept)

@@ -1,4 +1,4 @@
-"""The parts of a motion: what moves a layer, and where. Lengths are canvas pixels with y down."""
+"""Parts of a motion. Lengths are canvas pixels with y down, times are seconds."""
 
 from __future__ import annotations
 
@@ -12,7 +12,12 @@ Pair = tuple[float, float]
 
 @dataclass(frozen=True)
 class Disc:
-    """The nodes within `radius` pixels of `at`."""
+    """Disc that chooses the nodes in it.
+
+    Attributes:
+        at: Centre.
+        radius: Radius.
+    """
 
     at: Pair
     radius: float
@@ -20,20 +25,29 @@ class Disc:
 
 @dataclass(frozen=True)
 class Rectangle:
-    """The nodes in a `box` of x, y, width, height in pixels."""
+    """Rectangle that chooses the nodes in it.
+
+    Attributes:
+        box: x, y, width, height.
+    """
 
     box: tuple[float, float, float, float]
 
 
 Spot = Literal["top", "bottom", "left", "right", "border", "centre"] | Disc | Rectangle
-"""Nodes of a layer: a side of its box, its outline, its middle, a disc or a rectangle."""
+"""Choice of nodes of a layer: a side of its box, its border, its centre, a disc or a rectangle."""
 
 
 @dataclass(frozen=True)
 class Impulse:
-    """`velocity` in pixels a second that is added at `time`.
+    """Sudden change of velocity.
 
-    It fades to 0 at `radius` from `at`, or takes the whole layer if they are None.
+    Attributes:
+        velocity: Velocity that is added, in pixels per second.
+        time: Time at which it is added.
+        at: Centre; None for the whole layer alike.
+        radius: Distance from the centre at which the impulse has faded to 0; None for the whole
+            layer alike.
     """
 
     velocity: Pair
@@ -44,7 +58,13 @@ class Impulse:
 
 @dataclass(frozen=True)
 class Key:
-    """Where a handle is at `time`: scaled about its centre by `scale`, then moved by `offset`."""
+    """Place of a handle at a time: it is scaled about its centre, then moved.
+
+    Attributes:
+        time: The time.
+        offset: Displacement of the handle.
+        scale: Factor of distances from its centre.
+    """
 
     time: float
     offset: Pair = (0.0, 0.0)
@@ -53,7 +73,14 @@ class Key:
 
 @dataclass(frozen=True)
 class Handle:
-    """The nodes within `radius` of `at` follow `keys`, whose times ascend."""
+    """Handle, whose nodes follow keys.
+
+    Attributes:
+        at: Centre of the handle at rest.
+        radius: Radius within which nodes belong to the handle.
+        keys: Keys with ascending times.
+        ease: Interpolation between keys.
+    """
 
     at: Pair
     radius: float
@@ -63,16 +90,16 @@ class Handle:
 
 @dataclass(frozen=True)
 class LayerMotion:
-    """How a layer moves.
+    """Motion of a layer.
 
     Attributes:
-        material: What it is made of.
-        pins: Nodes that stay.
-        mass: Factor of the material's density.
-        floor: Whether the lowest node at rest stands on a floor.
-        upright: Whether the shape it returns to moves but does not turn.
-        impulses: What hits it.
-        handles: What leads it.
+        material: Material of the layer.
+        pins: Nodes that do not move.
+        mass: Factor of the density of the material.
+        floor: Whether the layer stands on a floor at its lowest node at rest.
+        upright: Whether the shape that the layer returns to moves but does not turn.
+        impulses: Impulses that act on the layer.
+        handles: Handles that lead parts of the layer.
     """
 
     material: Material = MATERIALS["cloth"]
@@ -86,17 +113,18 @@ class LayerMotion:
 
 @dataclass(frozen=True)
 class Wind:
-    """A wind with gusts that travel along it.
+    """Wind with gusts that travel along it.
 
-    It grows from nothing at a layer's pins to its full strength at the node farthest from them.
+    It grows from 0 at the pins of a layer to its full strength at the node farthest from them.
 
     Attributes:
-        direction: Where it blows; only its angle counts.
-        strength: Acceleration of a layer whose material takes 1, in its diagonals a second squared.
+        direction: Vector that the wind blows along; only its angle counts.
+        strength: Acceleration of a layer whose `Material.wind` is 1, in diagonals of the layer per
+            second squared.
         scale: Length of the largest gusts in pixels.
-        frequency: Of the slowest gusts, in Hz.
-        gust: Share of the wind that comes and goes, 0..1; the rest is steady.
-        across: Share of the gusts' power that blows across the direction, 0..1.
+        frequency: Frequency of the slowest gusts in Hz.
+        gust: Share of the wind that comes in gusts, 0..1; the rest is steady.
+        across: Share of the power of gusts that blows across the direction, 0..1.
     """
 
     direction: Pair = (1.0, 0.0)
@@ -109,7 +137,12 @@ class Wind:
 
 @dataclass(frozen=True)
 class Collide:
-    """Whether layers stay on the `canvas`, and whether `layers` push each other away."""
+    """Kinds of collisions.
+
+    Attributes:
+        canvas: Whether layers stay on the canvas.
+        layers: Whether layers push each other away.
+    """
 
     canvas: bool = False
     layers: bool = False
@@ -117,7 +150,13 @@ class Collide:
 
 @dataclass(frozen=True)
 class Attachment:
-    """Nodes of the first of two `layers` within `radius` of `at` keep their place on the second."""
+    """Attachment of one layer to another.
+
+    Attributes:
+        layers: Names of two layers; nodes of the first keep their place on the second.
+        at: Centre of the disc of these nodes.
+        radius: Radius of the disc.
+    """
 
     layers: tuple[str, str]
     at: Pair

@@ -1,6 +1,6 @@
-"""Presets: motions that suit any picture, as the JSON values of a motion.
+"""Presets: motions for any picture, as the JSON values of a motion.
 
-Everything scales with the layers, so that a picture moves alike at every resolution.
+All lengths scale with the layers, so that a picture moves alike at every resolution.
 """
 
 from __future__ import annotations
@@ -12,30 +12,30 @@ from typing import Any
 from ..errors import UsageError
 
 Box = tuple[float, float, float, float]
-"""x0, y0, x1, y1 in canvas pixels."""
+"""Bounds x0, y0, x1, y1 in canvas pixels."""
 
 Values = dict[str, Any]
 
 HOP_HEIGHT, HOP_TIME, HOP_EVERY = 0.1, 0.65, 1.3
-"""Height of a hop relative to the diagonal, its seconds in the air, and from one to the next."""
+"""Height of a hop relative to the diagonal, its seconds in the air, and seconds between hops."""
 
 BREATH_EVERY, BREATH = 2.0, 1.12
-"""Seconds from one breath to the next, and how much wider a breath makes a chest."""
+"""Seconds from one breath to the next, and factor by which a breath enlarges the chest."""
 
 CHEST, CHEST_RADIUS = 0.6, 0.2
-"""Where that is: height in the box from its top, and radius relative to the diagonal."""
+"""Height of the chest in the box, from its top, and radius relative to the diagonal."""
 
 NUDGE_EVERY = 2.0
 """Seconds from one nudge of the jelly to the next."""
 
 
 def preset(name: str, boxes: Mapping[str, Box], duration: float) -> Values:
-    """The JSON values of a preset, without the version.
+    """Makes the JSON values of a preset, without the version.
 
     Args:
-        name: One of `PRESETS`.
-        boxes: Boxes of the layers to move, by name.
-        duration: Of the motion in seconds.
+        name: Name of the preset, one of `PRESETS`.
+        boxes: Bounds of the layers to move, by name.
+        duration: Duration of the motion in seconds, positive.
 
     Raises:
         UsageError: There is no such preset, or no layer.
@@ -51,14 +51,17 @@ def preset(name: str, boxes: Mapping[str, Box], duration: float) -> Values:
 
 
 def filled(values: Mapping[str, Any], boxes: Mapping[str, Box]) -> Values:
-    """A motion that names a preset, with what the preset says wherever it says nothing itself.
+    """Completes a motion that names a preset: values of the preset stand for those not given.
 
     Args:
         values: JSON values of the motion.
-        boxes: Boxes of the picture's layers, by name.
+        boxes: Bounds of the layers of the picture, by name.
+
+    Returns:
+        JSON values of a motion that names no preset.
 
     Raises:
-        UsageError: It names a layer that is not there.
+        UsageError: The motion names a layer or a preset that does not exist.
     """
     named = values.get("layers", {"*": {}})
     missing = [n for n in named if n not in boxes and n != "*"]
@@ -76,32 +79,32 @@ def filled(values: Mapping[str, Any], boxes: Mapping[str, Box]) -> Values:
 
 
 def _sway(boxes: Mapping[str, Box], extent: float, duration: float) -> Values:
-    """Standing on its feet in the wind."""
+    """Sways in the wind, pinned at the bottom."""
     wind = {"strength": 2.1, "scale": extent, "frequency": 0.35, "gust": 0.85, "across": 0.05}
     return {"wind": wind, "layers": _each(boxes, "hair", "bottom")}
 
 
 def _breeze(boxes: Mapping[str, Box], extent: float, duration: float) -> Values:
-    """Hanging in a light wind."""
+    """Hangs in a light wind, pinned at the top."""
     wind = {"strength": 2.4, "scale": extent, "frequency": 0.45, "gust": 0.8, "across": 0.3}
     return {"wind": wind, "layers": _each(boxes, "cloth", "top")}
 
 
 def _wave(boxes: Mapping[str, Box], extent: float, duration: float) -> Values:
-    """A flag on its pole."""
+    """Waves like a flag, pinned at the left."""
     wind = {"strength": 1.7, "scale": 0.6 * extent, "frequency": 0.7, "gust": 0.9, "across": 0.9}
     return {"wind": wind, "layers": _each(boxes, "cloth", "left")}
 
 
 def _flame(boxes: Mapping[str, Box], extent: float, duration: float) -> Values:
-    """Rising and flickering."""
+    """Flickers upwards, pinned at the bottom."""
     wind = {"direction": [0, -1], "strength": 1.2, "scale": extent, "frequency": 1.0,
             "gust": 0.75, "across": 0.6}  # fmt: skip
     return {"wind": wind, "layers": _each(boxes, "flame", "bottom")}
 
 
 def _jelly(boxes: Mapping[str, Box], extent: float, duration: float) -> Values:
-    """Nudged from the left and from the right in turn."""
+    """Wobbles, nudged from the left and from the right in turn."""
     nudges = _times(duration, NUDGE_EVERY)
     layers = _each(boxes, "jelly", "bottom")
     for name, (x0, y0, x1, y1) in boxes.items():
@@ -114,7 +117,7 @@ def _jelly(boxes: Mapping[str, Box], extent: float, duration: float) -> Values:
 
 
 def _bounce(boxes: Mapping[str, Box], extent: float, duration: float) -> Values:
-    """Hopping where it stands."""
+    """Hops on the spot."""
     gravity = 8 * HOP_HEIGHT * extent / HOP_TIME**2
     speed = gravity * HOP_TIME / 2
     layers = _each(boxes, "jelly", None)
@@ -127,7 +130,7 @@ def _bounce(boxes: Mapping[str, Box], extent: float, duration: float) -> Values:
 
 
 def _breathe(boxes: Mapping[str, Box], extent: float, duration: float) -> Values:
-    """Breathing in and out."""
+    """Breathes in and out, pinned at the bottom."""
     layers = _each(boxes, "jelly", "bottom")
     starts = _times(duration, BREATH_EVERY)
     breath = duration / len(starts)
@@ -156,15 +159,16 @@ PRESETS: dict[str, Callable[[Mapping[str, Box], float, float], Values]] = {
     "flame": _flame,
     "breathe": _breathe,
 }
+"""Function of each preset: its JSON values, from bounds of layers, common diagonal and duration."""
 
 
 def _each(boxes: Mapping[str, Box], material: str, pin: str | None) -> dict[str, Values]:
-    """Layers of one material that stay upright, whatever part of them is pinned."""
+    """JSON values of upright layers of one material; `pin` names the side that is pinned."""
     pins = {} if pin is None else {"pins": [pin]}
     return {name: {"material": material, **pins, "upright": True} for name in boxes}
 
 
 def _times(duration: float, every: float) -> list[float]:
-    """Times of events about `every` seconds apart that divide the duration evenly."""
+    """Times of events about `every` seconds apart, which divide the duration evenly."""
     count = min(max(1, round(duration / every)), 1000)
     return [duration * i / count for i in range(count)]

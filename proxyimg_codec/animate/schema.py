@@ -1,4 +1,4 @@
-"""Checks JSON against `motion.schema.json`."""
+"""Check of JSON values against `motion.schema.json`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..io import json_schema
 
 @cache
 def schema() -> dict[str, Any]:
-    """The published schema of motions; not to be changed."""
+    """Returns the published JSON Schema of motions; it is cached, so it must not be changed."""
     text = resources.files(__package__).joinpath("motion.schema.json").read_text("utf-8")
     loaded: dict[str, Any] = json.loads(text)
     return loaded
@@ -23,14 +23,14 @@ def check(value: Any) -> None:
     """Checks the JSON value of a motion.
 
     Args:
-        value: What `json.loads` gives.
+        value: Value such as `json.loads` returns.
 
     Raises:
-        UsageError: It breaks a rule; the error names the place, such as ``layers.hair.pins[0]``,
-            what is wrong, and what may be.
+        UsageError: The value does not match the schema; the message says the place, such as
+            ``layers.hair.pins[0]``, what is wrong, and what is allowed.
     """
     rules = schema()
-    # What one of several keys is needed for is said better here than in general.
+    # This rule is checked here, for a better message than that of the general checker.
     json_schema.check(value, {k: v for k, v in rules.items() if k != "anyOf"}, rules["$defs"])
     if not any(key in value for rule in rules["anyOf"] for key in rule["required"]):
         raise UsageError("neither 'layers' nor 'preset' is given; one has to say what moves")

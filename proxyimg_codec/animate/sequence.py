@@ -1,4 +1,4 @@
-"""Frames of a picture that moves, in their order, on several threads."""
+"""Frames of a picture with a motion, rendered in order on several threads."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from ..render.pixels import render
 def times(
     image: Pictured, *, duration: float | None = None, fps: float | None = None
 ) -> list[float]:
-    """The times of the frames of a clip in seconds.
+    """Times of the frames of a clip in seconds.
 
     Args:
-        image: A picture with a timeline.
-        duration: Seconds; by default those of the timeline.
-        fps: Frames a second; by default those that the timeline was made for.
+        image: A picture with a motion.
+        duration: Duration of the clip in seconds, at most 3600; by default that of the timeline.
+        fps: Frames per second, at most 240; by default the rate that the timeline was made for.
 
     Raises:
-        UsageError: The picture does not move, or a number makes no sense.
+        UsageError: The picture has no motion, or a number is out of range.
     """
     timeline = image.picture.timeline
     if timeline is None:
@@ -46,16 +46,16 @@ def frames(
 ) -> Iterator[NDArray[np.uint8]]:
     """Renders a picture at several times.
 
-    What does not move is rendered once, and shared.
+    Layers that do not move are rendered once for all frames.
 
     Args:
-        image: A picture with a timeline.
+        image: A picture with a motion.
         at: Times in seconds.
-        jobs: Threads.
-        options: As of `Image.render`.
+        jobs: Number of threads.
+        options: Options of `Image.render`, such as ``scale``.
 
     Yields:
-        uint8 [H, W, 3 or 4], one for each time.
+        uint8 [H, W, 3 or 4] frame for each time.
     """
     cache = Cache()
 

@@ -1,4 +1,4 @@
-"""Moves layers through the frames of a motion."""
+"""Simulation of a motion, frame by frame."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ __all__ = ["Body", "Frames", "simulate"]
 Real = NDArray[np.float64]
 
 WARM_UP = 3.0
-"""Seconds that a loop has gone on for before its first frame."""
+"""Seconds of simulation before the first frame of a loop."""
 
 OVERLAP = 0.25
-"""Share of a loop in which its end fades into its beginning."""
+"""Share of a loop, from its beginning on, that is faded in from the frames after its end."""
 
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """Where layers are in each frame.
+    """Displacements of bodies in each frame.
 
     Attributes:
-        displacements: By name of the layer, for those that move: float64 [F, N, 2], how far each
-            node is from its place at rest, in pixels.
-        fps: Frames a second.
+        displacements: For each body that moves, by name, float64 [F, N, 2] displacements of its
+            nodes from rest in canvas pixels.
+        fps: Frames per second.
         loop: Whether frame 0 follows the last one.
     """
 
@@ -51,23 +51,23 @@ def simulate(
 ) -> Frames:
     """Simulates a motion.
 
-    A motion that does not loop starts at rest. One that loops has already gone on for a while;
-    what its end and its beginning still differ by is faded over.
+    A motion that does not loop starts at rest. A loop starts after `WARM_UP` seconds of simulation,
+    and what its end and its beginning still differ by is faded over.
 
     Args:
-        bodies: The layers, with different names; those that the motion does not name stand still,
+        bodies: The bodies, with different names. Those that the motion does not name stand still,
             but others can be attached to them or collide with them.
-        motion: What moves.
-        canvas: Width and height in pixels.
-        progress: Is called with the number of simulated frames and of all frames to simulate,
-            after each.
+        motion: The motion.
+        canvas: Width and height of the canvas in pixels.
+        progress: Called after each frame with the number of simulated frames, and the number of all
+            frames to simulate.
 
     Returns:
-        The displacements; the same input gives the same ones.
+        The displacements; the same input always gives the same ones.
 
     Raises:
-        UsageError: The motion names a layer that is not there, a pin, handle, impulse or
-            attachment catches no node, or a mesh that should move has no area.
+        UsageError: The motion names a layer that does not exist, a pin, handle, impulse or
+            attachment holds no node, or the mesh of a layer that should move has no area.
     """
     frames, before, after = motion.frames, 0, 0
     if motion.loop:
@@ -91,7 +91,11 @@ def simulate(
 
 
 def _closed(positions: Real, frames: int) -> Real:
-    """The first `frames` of positions [frames + n, N, 2]: the last n fade into the first."""
+    """Closes a loop: fades the last n of positions [frames + n, N, 2] into the first n.
+
+    Returns:
+        float64 [frames, N, 2]; a part of `positions`, which is changed.
+    """
     n = len(positions) - frames
     if n:
         t = (np.arange(n) / n)[:, None, None]

@@ -1,4 +1,4 @@
-"""All layers as one system of particles, and a step of its simulation."""
+"""System of particles of all bodies, and a step of its simulation."""
 
 from __future__ import annotations
 
@@ -22,28 +22,33 @@ ATTACHED = 20.0
 """Frequency in Hz with which an attached particle returns to its place."""
 
 SQUASH = 0.2
-"""How far a layer can be pressed against its floor, as a share of its height."""
+"""Largest displacement of particles below their rest positions above a floor, as a share of their
+height above it."""
 
 
 class System:
-    """The particles of all layers; layers that the motion does not name stand still.
+    """Particles of all bodies; bodies that the motion does not name stand still.
 
     Args:
-        bodies: The layers.
-        motion: What moves them.
-        canvas: Width and height in pixels.
-        measured: Whether `work` is kept, which takes time.
-        count: Number of the first step; forces of a loop also have times before 0.
+        bodies: The bodies.
+        motion: The motion.
+        canvas: Width and height of the canvas in pixels.
+        measured: Whether to compute `work`, which takes time.
+        count: Number of the first step; in a loop it may be negative.
 
     Attributes:
+        layers: Motion of each body, or None.
         parts: Particles of each body.
-        rest: Positions at rest, float64 [2, P], in pixels.
-        x, v: Positions and velocities [2, P] in pixels and pixels a second.
-        w: Inverse masses [P]; 0 for what is pinned, led or still.
-        work: What wind, impulses, drag and handles have done so far; see `energy`.
+        rest: float64 [2, P] rest positions in pixels.
+        x: float64 [2, P] positions in pixels.
+        v: float64 [2, P] velocities in pixels per second.
+        w: float64 [P] inverse masses; 0 for particles that are pinned, led by handles, or still.
+        count: Number of the next step.
+        work: Work done by wind, impulses, drag and handles so far; see `energy`.
 
     Raises:
-        UsageError: The motion names what is not there, or a mesh cannot move.
+        UsageError: The motion names a layer that does not exist, a part of it holds no node, or the
+            mesh of a layer that should move has no area.
     """
 
     def __init__(
@@ -78,7 +83,7 @@ class System:
                 yield body, layer, part
 
     def _add(self, body: Body, layer: LayerMotion, part: slice) -> None:
-        """Masses, pins and handles of a layer."""
+        """Adds the masses, pins and handles of a body."""
         if not len(body.faces) or not np.abs(body.areas).sum() > 0:
             raise UsageError(f"layer {body.name!r}: its mesh has no area, so it cannot move")
         self.mass[part] = elastic.masses(body, layer)
@@ -95,7 +100,7 @@ class System:
 
     @property
     def period(self) -> float | None:
-        """After how many seconds the forces repeat, or None."""
+        """Seconds after which the forces repeat; None if they do not."""
         return self.motion.period if self.motion.loop else None
 
     def _constraints(self) -> list[Constraint]:
@@ -133,7 +138,7 @@ class System:
         return made
 
     def _prepare_forces(self) -> None:
-        """Wind, drag and impulses of each particle."""
+        """Computes wind, drag and impulses of all particles."""
         motion, h = self.motion, self.step_seconds
         response, drag = np.zeros(len(self.w)), np.full(len(self.w), float(motion.drag))
         self.impulses: dict[int, list[Real]] = {}
@@ -161,7 +166,7 @@ class System:
     def _prepare_collisions(self, canvas: tuple[int, int]) -> None:
         low, high = np.full_like(self.rest, -np.inf), np.full_like(self.rest, np.inf)
         if self.motion.collide.canvas:
-            # What reaches beyond the canvas at rest may stay there.
+            # Particles that lie beyond the canvas at rest may stay there.
             low = np.minimum(self.rest, 0)
             high = np.maximum(self.rest, np.array(canvas, float)[:, None])
         for _, layer, part in self._moving():
@@ -180,13 +185,13 @@ class System:
             self.crowd = collide.Layers(outlines, self.w)
 
     def _lead(self, time: float) -> None:
-        """Brings what handles hold to where it is at a time."""
+        """Moves the particles that handles lead to their positions at a time in seconds."""
         for curve, centre, at in self.curves:
             offset, scale = curve.at(time)
             self.x[:, at] = centre + scale * (self.rest[:, at] - centre) + offset[:, None]
 
     def step(self) -> None:
-        """One step of the simulation."""
+        """Simulates one step, of 1 / (`Motion.fps` * `Motion.steps`) seconds."""
         h, cycle = self.step_seconds, self.motion.frames * self.motion.steps
         now = self.count % cycle if self.motion.loop else self.count
         if self.curves:
@@ -215,26 +220,26 @@ class System:
         self.count += 1
 
     def kinetic_energy(self) -> float:
-        """Of all particles that are free to move."""
+        """Kinetic energy of all particles."""
         return float((self.mass * (self.v**2).sum(0)).sum()) / 2
 
     def elastic_energy(self) -> float:
-        """Stored by the constraints."""
+        """Elastic energy of all constraints."""
         return sum(c.energy(self.x) for c in self.constraints)
 
     def energy(self) -> float:
-        """Kinetic, elastic, and potential in gravity (0 at rest).
+        """Sum of kinetic, elastic, and gravitational energy; the latter is 0 at rest.
 
-        Measured over 10,000 steps of each preset it never exceeds its first value plus `work`:
-        what else a step does to it is to take some away.
+        Over 10,000 steps of each preset it never exceeded its first value plus `work`: apart from
+        that, a step only takes energy away.
         """
         fallen = float((self.mass * self.fall * (self.x - self.rest)).sum())
         return self.kinetic_energy() + self.elastic_energy() - fallen
 
     def displacements(self) -> list[Real]:
-        """How far the nodes of each body are from their places at rest: [N, 2] in pixels.
+        """Displacements of the nodes of each body from rest, float64 [N, 2] in pixels.
 
-        Nodes without a triangle go with the nearest node that has one.
+        Nodes without a triangle follow the nearest node that has one.
         """
         away = (self.x - self.rest).T
         result = []
@@ -252,7 +257,7 @@ def _known(name: str, bodies: Sequence[Body], path: str) -> None:
 
 
 def _chosen(bodies: Sequence[Body], motion: Motion) -> list[LayerMotion | None]:
-    """What the motion says of each body."""
+    """Motion of each body, or None; raises `UsageError` if the motion names another body."""
     if not bodies:
         raise UsageError("there is no layer to move")
     for name in motion.layers:
@@ -263,9 +268,9 @@ def _chosen(bodies: Sequence[Body], motion: Motion) -> list[LayerMotion | None]:
 
 
 def _exposure(body: Body, layer: LayerMotion) -> Real:
-    """How much of the wind reaches each node [N]: 0 at pins, growing to 1 far from them.
+    """Share of the wind that reaches each node, float64 [N]: 0 at pins, 1 farthest from them.
 
-    So a layer bends all along, whatever is pinned, instead of folding beside its pins.
+    So a layer bends over its whole length, whatever is pinned, instead of folding beside its pins.
     """
     pins = [body.caught(spot, "") for spot in layer.pins]
     if not pins:

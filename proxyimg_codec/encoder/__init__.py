@@ -1,1 +1,1 @@
-"""The encoder: decompose, fit boundaries and textures, quantize, pack."""
+"""Encoder: finds layers in a picture, fits boundaries and textures, and quantizes them."""

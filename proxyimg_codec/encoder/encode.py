@@ -1,4 +1,4 @@
-"""From pixels to a `Picture`: layers, boundaries, fitted and quantized textures."""
+"""Encoding of pixels as a `Picture`: layers, boundaries, fitted and quantized textures."""
 
 from __future__ import annotations
 
@@ -29,14 +29,20 @@ from .shapes.masks import Region
 from .shapes.meshes import with_meshes
 
 CODES_MAX = DEFAULT_LIMITS.codes
-"""Codes that readers accept: where a large picture would have more, they lie further apart."""
+"""Most codes that readers accept by default; codes of a large picture lie further apart."""
 
 
 class Progress(Protocol):
-    """Told what the encoder does."""
+    """Callback that is told how far the encoder is."""
 
     def __call__(self, stage: str, done: int, total: int) -> None:
-        """`done` of `total` units of `stage` are finished."""
+        """Reports that `done` of `total` units of a stage are finished.
+
+        Args:
+            stage: Name of the stage: ``layers`` or ``texture``.
+            done: Number of finished units.
+            total: Number of units of the stage.
+        """
 
 
 def encode(
@@ -51,21 +57,23 @@ def encode(
     """Encodes a picture.
 
     Args:
-        pixels: [H, W] or [H, W, C] with C = 1 grey, 2 grey and alpha, 3 RGB, 4 RGB and straight
-            alpha; uint8, uint16, or floating point in 0..1.
-        settings: What is asked for; `options` are fields of `Settings` given by name instead.
-        masks: User-given layers back to front; the built-in decomposition otherwise.
-        blocks: Metadata ``icc``, ``exif``, ``xmp`` to carry.
-        progress: Called as work goes on.
-        options: Fields of `Settings`, such as ``quality=70``.
+        pixels: [H, W] or [H, W, C] with C = 1 for grey, 2 for grey and alpha, 3 for RGB, 4 for RGB
+            and alpha; alpha is straight; uint8, uint16, or floating point in 0..1.
+        settings: Settings of the encoder; by default ``Settings()``.
+        masks: Layers given by the user, back to front; by default the encoder finds layers itself.
+        blocks: Metadata blocks to carry: ``icc``, ``exif``, ``xmp``.
+        progress: Called with the name of a stage, and its numbers of units done and in all.
+        options: Fields of `Settings` that replace those of `settings`, such as ``quality=70``.
 
     Returns:
-        The picture as it will be decoded.
+        The picture as a reader will decode it.
 
     Raises:
-        InputError: The array cannot be a picture, or a mask does not fit it.
-        UsageError: A setting is out of range.
-        UnsupportedError: Something needed is not installed.
+        InputError: The array cannot be a picture, a mask does not fit it, or a mesher fails.
+        UsageError: A setting or metadata block is invalid, or a target size or PSNR is out of
+            reach.
+        UnsupportedError: A package that is needed is not installed.
+        LimitError: The picture is larger than readers accept by default.
     """
     settings = _with_options(settings or Settings(), options)
     report = progress or (lambda stage, done, total: None)
@@ -86,7 +94,7 @@ def encode(
 
 
 def _with_options(settings: Settings, options: Mapping[str, Any]) -> Settings:
-    """Settings with some fields changed."""
+    """Replaces some fields of settings; raises `UsageError` if there is no such field."""
     try:
         return replace(settings, **options) if options else settings
     except TypeError as error:
@@ -96,7 +104,7 @@ def _with_options(settings: Settings, options: Mapping[str, Any]) -> Settings:
 def _planned(
     picture: Floats, settings: Settings, masks: Sequence[Region] | None, report: Progress
 ) -> Plan:
-    """The layers of a picture [H, W, 4] with straight alpha."""
+    """Plan of the layers of a picture, float32 [H, W, 4] with straight alpha."""
     report("layers", 0, 1)
     plan = plan_layers(picture, settings, masks)
     report("layers", 1, 1)
@@ -106,7 +114,7 @@ def _planned(
 
 
 def _with_network(picture: Floats, plan: Plan, settings: Settings, report: Progress) -> Picture:
-    """The planned layers of a premultiplied picture [H, W, 4], with codes and a network."""
+    """Encodes a premultiplied picture, float32 [H, W, 4], with implicit textures."""
     height, width = picture.shape[:2]
     outlines = [layer.boundary for layer in plan.layers]
 
@@ -120,7 +128,7 @@ def _with_network(picture: Floats, plan: Plan, settings: Settings, report: Progr
 
 
 def plain(picture: Floats) -> bool:
-    """Whether a picture [H, W, C] is of one colour."""
+    """Whether all pixels of a picture [H, W, C] are equal."""
     return bool((picture == picture[0, 0]).all())
 
 
@@ -132,15 +140,22 @@ def fit_image(
     settings: Settings,
     report: Progress,
 ) -> Picture:
-    """The 8-bit picture, without metadata, of planned layers.
+    """Fits the implicit textures of planned layers, which share one network.
 
     Args:
-        problem_of: The fitting problem for a network and a spacing of codes.
-        pixels: Number of pixels to learn; sets the size of the network.
+        problem_of: Makes the fitting problem for the sizes of a network and a spacing of codes in
+            canvas pixels.
+        pixels: Number of pixels to learn; decides the size of the network.
         plan: The layers.
-        size: Width and height of the canvas.
-        settings: What is asked for.
-        report: Told what is done.
+        size: Width and height of the canvas in pixels.
+        settings: Settings of the encoder.
+        report: Called as steps of the optimizer are done.
+
+    Returns:
+        A picture with a depth of 8 bits, without metadata.
+
+    Raises:
+        UnsupportedError: torch is needed and not installed, or the device is not available.
     """
     shape, spacing = settings.network(pixels, plan.channels), settings.spacing
     problem = problem_of(shape, spacing)
@@ -166,7 +181,7 @@ def fit_image(
 
 
 def check_blocks(blocks: Mapping[str, bytes]) -> None:
-    """Raises `UsageError` for metadata that a file cannot hold."""
+    """Raises `UsageError` if a metadata block is empty or of an unknown kind."""
     for name, block in blocks.items():
         if name not in meta.BLOCKS or not block:
             raise UsageError(
@@ -177,7 +192,11 @@ def check_blocks(blocks: Mapping[str, bytes]) -> None:
 def _fit(
     problem: Problem, settings: Settings, report: Progress
 ) -> tuple[State, list[NDArray[np.bool_]]]:
-    """Fitted state, and the mask of stored codes of each layer."""
+    """Fits the parameters of a problem.
+
+    Returns:
+        The quantized state, and for each layer bool [rows, columns], True at stored positions.
+    """
     if (problem.target == problem.target[0]).all():
         return constant(problem, settings), problem.stored()
     done = 0
@@ -208,7 +227,7 @@ def _fit(
 
 
 def constant(problem: Problem, settings: Settings) -> State:
-    """The state of a picture of one colour: the output bias says it all."""
+    """State of a picture of one colour: everything is 0 but the bias of the output."""
     state = fit.initial(problem, settings.seed)
     state.codes[:] = 0
     state.weights[:] = 0
@@ -220,7 +239,17 @@ def constant(problem: Problem, settings: Settings) -> State:
 def assemble(
     problem: Problem, state: State, stored: list[NDArray[np.bool_]], settings: Settings
 ) -> tuple[Network, list[ImplicitTexture]]:
-    """The quantized network and textures of a fitted state."""
+    """Quantizes a fitted state.
+
+    Args:
+        problem: The problem that the state was fitted to.
+        state: The state, with quantization steps.
+        stored: For each layer bool [rows, columns], True at positions whose codes are stored.
+        settings: Settings of the encoder, for the bits per code and per weight.
+
+    Returns:
+        The network, and the texture of each layer.
+    """
     shape: NetShape = problem.shape
     rows = rows_of(shape, state.weights)
     ends = np.cumsum([o for _, o in shape.layers])[:-1]

@@ -1,7 +1,7 @@
-"""From a layered picture to a `Picture`: every layer becomes one of its own.
+"""Encoding of a layered picture as a `Picture`, layer by layer.
 
-Other than from a flat picture, a layer's texture is learnt from all of its own pixels, also those
-that others hide.
+Unlike a layer of a flat picture, a layer here has a texture of all its pixels, also of those that
+other layers hide.
 """
 
 from __future__ import annotations
@@ -29,30 +29,33 @@ from .shapes.masks import unique_names
 from .shapes.meshes import with_meshes
 
 MARGIN = 8
-"""Pixels around a layer's own that its outline is fitted with."""
+"""Pixels around a layer that take part in the fit of its boundary."""
 
 SURE = 0.5
-"""Where a layer with crisp outlines has this much alpha, its colour is its own."""
+"""Least alpha at which the colour of a pixel is trusted, in a layer without translucent parts."""
 
 
 def encode_layers(
     picture: LayeredPicture, settings: Settings | None = None, progress: Progress | None = None
 ) -> tuple[Picture, LayeredPicture]:
-    """Encodes a layered picture, layer by layer.
+    """Encodes a layered picture with implicit textures, layer by layer.
+
+    Opacity, visibility and groups of the layers are kept, and so are the metadata blocks.
 
     Args:
-        picture: What `read_openraster` gives, or made by hand; blocks are carried. Opacity,
-            visibility and groups of layers become those of the image's.
-        settings: What is asked for; those of the decomposition do not apply.
-        progress: Called as work goes on.
+        picture: Layers on a canvas, such as `read_openraster` returns.
+        settings: Settings of the encoder; those of segmentation have no effect.
+        progress: Called with the name of a stage, and its numbers of units done and in all.
 
     Returns:
-        The picture as it will be decoded, and the source with those layers only that it has: some
-        may have too few or too faint pixels to be found.
+        The picture as a reader will decode it, and `picture` without the layers that were left out
+        because they have too few or too faint pixels.
 
     Raises:
-        InputError: No layer is left.
-        LimitError: The canvas is too large.
+        InputError: No layer is left, or a mesher fails.
+        UsageError: A metadata block is invalid, or there is no such mesher.
+        UnsupportedError: A package that is needed is not installed.
+        LimitError: The canvas is larger than readers accept by default.
     """
     settings = settings or Settings()
     report = progress or (lambda stage, done, total: None)
@@ -64,7 +67,7 @@ def encode_layers(
     visible[..., :3] *= visible[..., 3:]
     whole = Plan(tuple(p.layers[0] for p in plans), 4, False)
     meshed = with_meshes(visible, whole, settings).layers
-    # A network without alpha leaves what is opaque exactly so: one for crisp layers, one for soft.
+    # Opaque layers have a network of their own without alpha, so that they stay exactly opaque.
     parts = []
     for channels in (3, 4):
         which = [k for k, plan in enumerate(plans) if plan.channels == channels]
@@ -79,7 +82,7 @@ def encode_layers(
 def _planned(
     picture: LayeredPicture, settings: Settings, report: Progress
 ) -> tuple[LayeredPicture, list[Plan]]:
-    """The source with the layers that can be found, and the plan of each."""
+    """Plans each layer; returns the source without layers that are too faint, and the plans."""
     sources: list[SourceLayer] = []
     plans: list[Plan] = []
     left_out = list(picture.left_out)
@@ -102,7 +105,7 @@ def _fitted(
     settings: Settings,
     report: Progress,
 ) -> Picture:
-    """The layers of `picture` as those of an image with one network."""
+    """Encodes the layers of `picture` as a picture with one network."""
     size = (picture.width, picture.height)
 
     def picture_of(k: int) -> Floats:
@@ -116,7 +119,13 @@ def _fitted(
 
 
 def _merged(parts: Sequence[Picture], picture: LayeredPicture, opaque: bool) -> Picture:
-    """One image of parts that share the layers of `picture`, with their poses and groups."""
+    """Merges encoded parts into one picture.
+
+    Args:
+        parts: Pictures with one network each; every layer of `picture` is in one of them.
+        picture: The source, for order, poses and groups of the layers.
+        opaque: Whether the back layer covers the canvas.
+    """
     sources = picture.layers
     paths = {s.groups[: i + 1]: "" for s in sources for i in range(len(s.groups))}
     names = unique_names([*(s.name for s in sources), *(path[-1] for path in paths)])
@@ -152,7 +161,7 @@ def _merged(parts: Sequence[Picture], picture: LayeredPicture, opaque: bool) -> 
 
 
 def _areas(picture: LayeredPicture) -> list[int]:
-    """Visible pixels of each layer."""
+    """Number of visible pixels of each layer; translucent ones count in part."""
     clear = np.ones((picture.height, picture.width), np.float32)
     areas = []
     for layer in reversed(picture.layers):
@@ -165,7 +174,7 @@ def _areas(picture: LayeredPicture) -> list[int]:
 
 
 def composite(picture: LayeredPicture) -> Floats:
-    """The layers with their opacities over each other: [H, W, 4], straight alpha in 0..1."""
+    """Composites the visible layers: float32 [H, W, 4] in 0..1 with straight alpha."""
     result = np.zeros((picture.height, picture.width, 4), np.float32)
     for layer in picture.layers:
         if layer.hidden:
@@ -182,7 +191,7 @@ def composite(picture: LayeredPicture) -> Floats:
 
 
 def _plan(layer: SourceLayer, picture: LayeredPicture, settings: Settings) -> Plan:
-    """The plan of one layer as a picture of its own, in canvas coordinates."""
+    """Plans one layer as a picture of its own; the boundary is in canvas coordinates."""
     height, width = layer.pixels.shape[:2]
     x0, y0 = max(layer.x - MARGIN, 0), max(layer.y - MARGIN, 0)
     x1 = min(layer.x + width + MARGIN, picture.width)
@@ -197,7 +206,11 @@ def _plan(layer: SourceLayer, picture: LayeredPicture, settings: Settings) -> Pl
 
 
 def _on_canvas(layer: SourceLayer, region: tuple[int, int, int, int]) -> Floats:
-    """The layer alone on a part of the canvas: [h, w, 4], straight alpha in 0..1."""
+    """Places a layer alone on a region x, y, w, h of the canvas.
+
+    Returns:
+        float32 [h, w, 4] in 0..1 with straight alpha, clear outside the layer.
+    """
     x, y, width, height = region
     canvas = np.zeros((height, width, 4), np.float32)
     source = to_float(layer.pixels)[0]
@@ -207,10 +220,19 @@ def _on_canvas(layer: SourceLayer, region: tuple[int, int, int, int]) -> Floats:
 
 
 def _clean(picture: Floats, soft: bool) -> Floats:
-    """`picture` with colours that go on beyond its rim; alpha is 1 unless the layer is `soft`.
+    """Continues the colours of a layer beyond its rim.
 
-    The outline draws the rim, and under it the texture must be that of the inside: pixels that are
-    little covered, or not at all, take the colour of the nearest one that is.
+    Decoders draw the rim by the coverage of the boundary, so the texture there has to have the
+    colours of the inside. Each pixel that is not trusted takes the colour of the nearest one that
+    is.
+
+    Args:
+        picture: float32 [H, W, 4] with straight alpha; it is changed.
+        soft: Whether the texture has alpha. If so, all pixels with any alpha are trusted; if not,
+            those with at least `SURE`, and alpha becomes 1 everywhere.
+
+    Returns:
+        The changed `picture`.
     """
     alpha = picture[..., 3]
     sure = alpha > 0 if soft else alpha >= SURE

@@ -1,6 +1,6 @@
-"""Reading of OpenRaster files (.ora), as Krita, GIMP and MyPaint write them.
+"""Reader of OpenRaster files (.ora), as Krita, GIMP and MyPaint write them.
 
-Follows the OpenRaster baseline (https://www.openraster.org/baseline/, 0.0.5).
+It follows the OpenRaster baseline (https://www.openraster.org/baseline/, 0.0.5).
 """
 
 from __future__ import annotations
@@ -25,21 +25,22 @@ from ..limits import DEFAULT_LIMITS, Limits
 from .shapes.masks import unique_names
 
 NAME_MAX = 200
-"""Characters of a layer's name before a number that makes it unique."""
+"""Most characters of a layer's name, without a number that makes it unique."""
 
 
 @dataclass(frozen=True, eq=False)
 class SourceLayer:
-    """A layer of a layered picture.
+    """Layer of a layered picture.
 
     Attributes:
-        name: Unique and printable.
-        pixels: [h, w, 1..4] uint8 or uint16, straight alpha, clipped to the canvas.
-        x: Column of its left edge, 0..canvas width - 1.
-        y: Row of its upper edge.
-        opacity: 0..1, those of its groups multiplied in.
-        hidden: Whether it, or a group that it is in, is switched off.
-        groups: Names of the groups that it is in, outermost first.
+        name: Unique printable name.
+        pixels: uint8 or uint16 [h, w, C] with C = 1 for grey, 2 for grey and alpha, 3 for RGB, 4
+            for RGB and alpha; alpha is straight; nothing lies outside the canvas.
+        x: Canvas column of the left edge, 0..canvas width - 1.
+        y: Canvas row of the upper edge, 0..canvas height - 1.
+        opacity: Opacity in 0..1, multiplied by those of the groups around the layer.
+        hidden: Whether the layer, or a group around it, is switched off.
+        groups: Names of the groups around the layer, outermost first.
     """
 
     name: str
@@ -53,14 +54,14 @@ class SourceLayer:
 
 @dataclass(frozen=True, eq=False)
 class LayeredPicture:
-    """Layers back to front on a canvas.
+    """Picture as layers on a canvas.
 
     Attributes:
-        width: Canvas width in pixels.
-        height: Canvas height.
-        layers: Those with anything in them, back to front.
-        blocks: Metadata: the ICC profile, if there is one.
-        left_out: Names of the layers without a pixel that could be seen.
+        width: Width of the canvas in pixels.
+        height: Height of the canvas in pixels.
+        layers: Layers that are not empty, back to front.
+        blocks: Metadata blocks; `read_openraster` gives the ICC profile, if there is one.
+        left_out: Names of the layers without visible pixels.
     """
 
     width: int
@@ -71,20 +72,26 @@ class LayeredPicture:
 
 
 def is_openraster(data: bytes) -> bool:
-    """Whether a file says that it is OpenRaster: its first entry is its type, not compressed."""
+    """Whether a file is marked as OpenRaster, by an uncompressed first entry with its type."""
     return data[:4] == b"PK\3\4" and data[30:].startswith(b"mimetypeimage/openraster")
 
 
 def read_openraster(data: bytes, name: str, limits: Limits = DEFAULT_LIMITS) -> LayeredPicture:
-    """Reads an OpenRaster file in memory, called `name` in messages.
+    """Reads an OpenRaster file.
 
-    Groups are flattened: their opacity goes to each of their layers, which differs from the
+    Groups are flattened: each layer takes the opacity of its groups. The result differs from the
     original where layers of a translucent group overlap.
 
+    Args:
+        data: Bytes of the file.
+        name: Name of the file in error messages.
+        limits: Bounds on the number of layers, the pixels and the bytes of each entry.
+
     Raises:
-        InputError: Not an OpenRaster file, damaged, or nothing in it to be seen.
-        UnsupportedError: It needs more than layers of PNG composited with source-over.
-        LimitError: It exceeds `limits`.
+        InputError: The file is not OpenRaster or damaged, or no layer has a visible pixel.
+        UnsupportedError: The file has layers that are not PNG, or a blend mode other than
+            source-over.
+        LimitError: The file exceeds `limits`.
     """
     try:
         archive = zipfile.ZipFile(io.BytesIO(data))
@@ -132,7 +139,7 @@ def _check(limits: Limits, name: str, value: int, where: str) -> None:
 
 
 def _entry(archive: zipfile.ZipFile, path: str, where: str, most: int) -> bytes:
-    """The bytes of a file in the archive, at most `most`."""
+    """Reads an entry of the archive; raises `LimitError` if it has more than `most` bytes."""
     try:
         info = archive.getinfo(path)
         if info.file_size > most:
@@ -141,17 +148,26 @@ def _entry(archive: zipfile.ZipFile, path: str, where: str, most: int) -> bytes:
     except KeyError:
         raise InputError(f"{where}: {path!r} is not in the file") from None
     except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, ValueError) as error:
-        # RuntimeError: it is encrypted, or compressed in a way that Python cannot undo.
+        # A RuntimeError says that the entry is encrypted or needs an unknown decompressor.
         raise InputError(f"{where}: {path} is damaged ({error})") from None
 
 
 def _walk(
     elements: Sequence[Element], around: SourceLayer, name: str
 ) -> Iterator[tuple[SourceLayer, str]]:
-    """Layers without pixels, and where these are, front to back; `around` has what they inherit."""
+    """Yields the layers of a stack, front to back, without pixels.
+
+    Args:
+        elements: Elements of the stack.
+        around: Position, opacity, visibility and groups that the layers inherit.
+        name: Name of the file in error messages.
+
+    Yields:
+        A layer, with its own name that need not be unique, and the entry that holds its pixels.
+    """
     for element in elements:
         if element.tag.startswith("{"):
-            continue  # an extension, which readers are free not to know
+            continue  # an extension, which readers may ignore
         where = f"{name}: {element.tag} {element.get('name', '')!r}"
         if element.tag not in ("layer", "stack"):
             raise UnsupportedError(f"{where}: only layers and stacks of them can be imported")
@@ -199,12 +215,12 @@ def _opacity(element: Element, where: str) -> float:
 
 
 def _printable(name: str) -> str:
-    """`name` with spaces in place of characters that cannot be shown, and cut."""
+    """Replaces characters of a name that cannot be shown by spaces, and shortens it."""
     return "".join(c if c.isprintable() else " " for c in name).strip()[:NAME_MAX].strip()
 
 
 def _png_pixels(png: bytes, where: str, limits: Limits) -> int:
-    """Pixels that a PNG file declares, checked before they are decoded."""
+    """Number of pixels in the header of a PNG file; its sides are checked before it is decoded."""
     if png[:8] != b"\x89PNG\r\n\x1a\n" or png[12:16] != b"IHDR" or len(png) < 33:
         raise UnsupportedError(f"{where}: its pixels are not a PNG file")
     width, height = struct.unpack(">II", png[16:24])
@@ -213,7 +229,7 @@ def _png_pixels(png: bytes, where: str, limits: Limits) -> int:
 
 
 def _clipped(layer: SourceLayer, width: int, height: int) -> SourceLayer | None:
-    """The layer within the canvas, or None if nothing of it is there."""
+    """Clips a layer to the canvas; returns None if nothing visible is left."""
     rows, columns = layer.pixels.shape[:2]
     x0, y0 = max(-layer.x, 0), max(-layer.y, 0)
     x1, y1 = min(width - layer.x, columns), min(height - layer.y, rows)

@@ -1,4 +1,4 @@
-"""Encoder settings: quality and effort as data."""
+"""Settings of the encoder, as plain data."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ PRESETS: dict[str, dict[str, Any]] = {
         "net_bits": 4,
     },
 }
-"""Settings of each preset, where they differ from the defaults; ``paper`` is ProxyImg's method."""
+"""Fields of `Settings` that each preset changes; ``paper`` is the method of ProxyImg."""
 
 EFFORT_STEPS = (500, 1000, 2000, 5000, 10000, 16000, 24000, 40000, 60000)
-"""Optimizer steps at effort 1..9; half of them with quantization in the loop."""
+"""Optimizer steps of implicit textures at effort 1..9; half of them train through rounding."""
 
 NODE_SHARE = 0.3
-"""Node sampling takes that share of the steps, for each costs several times as much."""
+"""Share of the steps that node sampling does, because each step costs several times as much."""
 
 NODE_SPACING = 8.0
 """Canvas pixels between codes at quality 50 with node sampling (ProxyImg, o)."""
 
 LAYERS_MAX = 64
-"""Most layers of a picture that is encoded: the trainer composites that many in a pixel."""
+"""Most layers of a picture that is encoded; the trainer composites at most as many in a pixel."""
 
 TEXTURES = ("auto", "implicit", "pyramid")
 TUNES = ("mse", "ms-ssim")
@@ -45,32 +45,37 @@ BACKGROUNDS = ("diffuse", "complete")
 
 @dataclass(frozen=True)
 class Settings:
-    """What an encode is asked for.
+    """Settings of the encoder.
 
     Attributes:
-        quality: 0..100. Pyramid: sets the quantization step, about 0.05 to 2 bits a pixel on
-            photographs. Implicit: sets density of codes, bits and width of the network.
-        effort: 1..9; sets the number of optimizer steps.
-        texture: The coder: ``pyramid``, ``implicit``, or ``auto``: implicit where a setting asks
-            for what only that has, or a picture has a single colour; else pyramid.
-        tune: ``mse``, or ``ms-ssim``: errors count less where there is much texture; pyramid alone.
-        target_bpp: Bits a pixel of the whole file, instead of quality; pyramid alone, as are:
-        target_size: Bytes of the whole file.
-        target_psnr: PSNR in dB of the decoded picture.
-        max_layers: Most layers of the decomposition; 1 = none.
-        segmenter: Who decomposes; see `plugins`.
-        feature_bits: Bits a code, 2..8; None = from quality. Implicit alone, as is:
-        net_bits: Bits a weight, 2..8; None = 8.
-        sampling: ``direct``, or ``node`` (the paper's method: features from mesh and boundary, and
-            its network, whatever the quality).
-        boundary: ``lsq`` (least squares) or ``chamfer`` (the paper's fit).
-        background: ``diffuse`` (hidden codes of the back layer are filled when decoding) or
-            ``complete`` (they are optimized for smoothness and stored).
-        mesh: Who makes proxy nodes, see `plugins`; ``none`` leaves them out, so that edits make
-            them when needed; None = delaunay for implicit textures, else none.
-        seed: Seed of everything random.
-        jobs: Threads, at least 1.
-        device: ``cpu`` or ``cuda``.
+        quality: Quality, 0..100. For a pyramid it sets the quantization step: about 0.05 to 2 bits
+            per pixel on photographs. For implicit textures it sets the spacing of codes, the bits
+            per code, and the width of the network.
+        effort: Effort, 1..9; sets the number of optimizer steps or rounds of refinement.
+        texture: Coder of textures: ``pyramid``, ``implicit`` or ``auto``, which is implicit if
+            another setting needs it or the picture has a single colour, and pyramid otherwise.
+        tune: Measure of errors: ``mse``, or ``ms-ssim``, by which they count less in busy parts of
+            the picture; pyramid only.
+        target_bpp: Size of the file in bits per pixel, instead of `quality`; pyramid only.
+        target_size: Size of the file in bytes, instead of `quality`; pyramid only.
+        target_psnr: PSNR of the decoded picture in dB, instead of `quality`; pyramid only.
+        max_layers: Most layers that the segmenter may find, 1..64; 1 does without it.
+        segmenter: Name of the segmenter; see `plugins`.
+        feature_bits: Bits per code, 2..8; None = decided by `quality`; implicit only.
+        net_bits: Bits per weight, 2..8; None = 8; implicit only.
+        sampling: ``direct``, or ``node`` for the paper's method: features from mesh and boundary,
+            and a network whose size does not depend on quality; implicit only.
+        boundary: Fit of boundaries: ``lsq`` (least squares) or ``chamfer`` (the paper's).
+        background: Hidden codes of the back layer: ``diffuse`` has the decoder fill them,
+            ``complete`` optimizes them for smoothness and stores them; implicit only.
+        mesh: Name of the mesher, see `plugins`; ``none`` stores no meshes, and edits make them when
+            needed; None = delaunay for implicit textures, else none.
+        seed: Seed of all random numbers, 0..2**32 - 1.
+        jobs: Number of threads, at least 1.
+        device: ``cpu`` or ``cuda``; ``cuda`` is for implicit textures only.
+
+    Raises:
+        UsageError: A field has a wrong type or is out of range, or fields contradict each other.
     """
 
     quality: float = 50.0
@@ -133,7 +138,7 @@ class Settings:
         self._check_coders()
 
     def _check_coders(self) -> None:
-        """Refuses settings of both coders at once."""
+        """Raises `UsageError` if settings need different coders, or there are several targets."""
         aims = [f"target_{k}" for k, v in self._targets().items() if v is not None]
         if len(aims) > 1:
             raise UsageError(f"{' and '.join(aims)} contradict each other")
@@ -150,7 +155,7 @@ class Settings:
         return {"bpp": self.target_bpp, "size": self.target_size, "psnr": self.target_psnr}
 
     def _implicit_alone(self) -> list[str]:
-        """The settings that are given and mean something to the implicit coder only."""
+        """Names of the changed settings that only the implicit coder has."""
         given = {
             "sampling node": self.sampling != "direct",
             "background complete": self.background != "diffuse",
@@ -162,35 +167,35 @@ class Settings:
 
     @property
     def target(self) -> tuple[str, float] | None:
-        """``bpp``, ``size`` or ``psnr`` and its value, if there is one to be met."""
+        """Kind of the target (``bpp``, ``size`` or ``psnr``) and its value, or None."""
         found = [(k, v) for k, v in self._targets().items() if v is not None]
         return found[0] if found else None
 
     @property
     def pyramid(self) -> bool:
-        """Whether textures are pyramids, pictures of a single colour excepted."""
+        """Whether textures are pyramids, unless the picture has a single colour."""
         if self.texture == "auto":
             return not self._implicit_alone()
         return self.texture == "pyramid"
 
     @property
     def mesher(self) -> str:
-        """Who makes proxy nodes."""
+        """Name of the mesher, or ``none``."""
         return self.mesh or ("none" if self.pyramid else "delaunay")
 
     @property
     def weight_bits(self) -> int:
-        """Bits a weight of the implicit coder's network."""
+        """Bits per weight of the decoder network of implicit textures."""
         return self.net_bits or 8
 
     @property
     def step(self) -> int:
-        """Quantization step of the pyramid, 2**(step / 64): 512 at quality 0, 128 at 100."""
+        """Index s of the pyramid's quantization step 2**(s / 64): 512 at quality 0, 128 at 100."""
         return round(512 - 3.84 * self.quality)
 
     @property
     def steps(self) -> int:
-        """Optimizer steps, as progress is told in."""
+        """Optimizer steps of implicit textures; the unit of progress, 1000 for pyramids."""
         if self.pyramid:
             return 1000
         steps = EFFORT_STEPS[self.effort - 1]
@@ -198,16 +203,16 @@ class Settings:
 
     @property
     def bits(self) -> int:
-        """Bits a code."""
+        """Bits per code."""
         if self.feature_bits is not None:
             return self.feature_bits
         return 3 if self.quality < 15 else 4 if self.quality < 80 else 5
 
     @property
     def spacing(self) -> float:
-        """Canvas pixels between codes: 14 at quality 0, 6.2 at 50, 2.75 at 100.
+        """Distance of codes in canvas pixels: 14 at quality 0, 6.2 at 50, 2.75 at 100.
 
-        With node sampling 8 at quality 50, and the others in proportion.
+        With node sampling it is 8 at quality 50, and in proportion at others.
         """
         spacing = float(14.0 * (2.75 / 14.0) ** (self.quality / 100))
         if self.sampling == "node":
@@ -215,19 +220,23 @@ class Settings:
         return spacing
 
     def network(self, pixels: int, channels: int) -> NetShape:
-        """Shape of the network for a picture of so many visible pixels.
+        """Sizes of the decoder network for direct sampling.
 
-        Width grows with quality, and shrinks with small pictures, where the weights would
-        outweigh the codes.
+        The width grows with quality. It is less for pictures below 256 x 256, where the weights
+        would take more bytes than the codes.
+
+        Args:
+            pixels: Number of visible pixels.
+            channels: Outputs, 3 (colour) or 4 (colour and alpha).
         """
         width = 24 + 16 * self.quality / 100
         width *= min(1.0, (pixels / 65536) ** 0.25)
         return NetShape(8, 5, max(4 * round(width / 4), 8), 2, channels)
 
     def record(self) -> dict[str, Any]:
-        """What is written into the file about its making: what differs from the defaults.
+        """Settings that differ from the defaults, by name, to be recorded in the file.
 
-        Nothing of the machine.
+        `jobs` and `device` are left out, so that the file does not depend on the machine.
         """
         usual = {f.name: f.default for f in fields(self)}
         return {

@@ -1,8 +1,9 @@
-"""Connectivity of a mesh: triangle after triangle across *gates*, and its coding.
+"""Coding of the connectivity of a mesh, triangle after triangle across *gates*.
 
-A gate is a directed edge of a triangle that waits for the triangle beyond it. Gates are answered in
-the order in which they came up: by one symbol, and for a new vertex by where it lies. `_Encoder`
-and `_Decoder` go the same way over the same `Border`; each step of one mirrors that of the other.
+A gate is an open edge: a directed edge of a coded triangle, beyond which nothing is coded yet.
+Gates are taken in the order in which they opened. A symbol says what lies beyond a gate; a new
+vertex also has a residual of its position. `_Encoder` and `_Decoder` take the same way over the
+same `Border`: each step of one mirrors a step of the other.
 """
 
 from __future__ import annotations
@@ -24,31 +25,42 @@ Point = tuple[int, int]
 Triangle = tuple[int, int, int]
 
 BORDER, NEW, RANKED, FAR = 0, 1, 2, 15
-"""Symbols of a gate: nothing beyond it, a new vertex, the vertex of rank s - 2, any old vertex."""
+"""Symbols s of a gate: border of the mesh, new vertex, vertex of rank s - 2, any known vertex."""
 
 RANKS = FAR - RANKED
-"""Vertices that have a symbol of their own at a gate."""
+"""Most vertices that have a symbol of their own at a gate."""
 
 SYMBOL_BITS = 4
-"""Bits a symbol."""
+"""Bits per symbol."""
 
 
 def encode(vertices: NDArray[np.uint8], triangles: NDArray[np.int32]) -> dict[str, Any]:
-    """The fields of MESH for a mesh whose vertices and triangles come in any order.
+    """Encodes the vertices and triangles of a base.
 
     Args:
-        vertices: uint8 [V, 2] x, y on the lattice.
-        triangles: int32 [T, 3].
+        vertices: uint8 [V, 2] x, y of the vertices on the lattice, in any order.
+        triangles: int32 [T, 3] vertices of the triangles, in any order.
+
+    Returns:
+        The fields of MESH that hold them.
 
     Raises:
-        ValueError: A triangle is not positive, a directed edge occurs twice, or a vertex belongs to
-            no triangle.
+        ValueError: A triangle does not have positive area, a directed edge occurs twice, or a
+            vertex belongs to no triangle.
     """
     return _Encoder(vertices, triangles).fields()
 
 
 def decode(fields: Mapping[str, Any], where: str) -> tuple[NDArray[np.uint8], NDArray[np.int32]]:
-    """Vertices [V, 2] on the lattice, and triangles [T, 3], in the order of the file.
+    """Decodes the vertices and triangles of a base.
+
+    Args:
+        fields: Fields of MESH.
+        where: Name of the chunk in error messages.
+
+    Returns:
+        uint8 [V, 2] x, y of the vertices on the lattice, and int32 [T, 3] vertices of the
+        triangles, in the order of the file.
 
     Raises:
         FormatError: The coded mesh is corrupt.
@@ -57,13 +69,16 @@ def decode(fields: Mapping[str, Any], where: str) -> tuple[NDArray[np.uint8], ND
 
 
 class Border:
-    """The growing mesh while it is coded, and the gates that wait.
+    """Growing mesh while it is coded, with its gates.
+
+    Args:
+        count: Number of vertices of the whole mesh, V.
 
     Attributes:
-        open: int32 [V] how many waiting gates each vertex is at.
-        waiting: For each waiting gate the vertex on its near side.
-        used: The directed edges of all triangles.
-        queue: Gates in their order; those that wait no more are passed over.
+        open: int32 [V] number of gates that each vertex is an end of.
+        waiting: For each gate its near vertex: the third corner of its triangle.
+        used: Directed edges of all triangles.
+        queue: Gates in the order in which they opened; closed ones are skipped.
     """
 
     def __init__(self, count: int) -> None:
@@ -75,32 +90,32 @@ class Border:
         self.queue: deque[Edge] = deque()
 
     def add(self, x: int, y: int) -> int:
-        """A new vertex."""
+        """Adds a vertex at x, y on the lattice, and returns its number."""
         self._x[self.known], self._y[self.known] = x, y
         self._places.append((x, y))
         return self.known - 1
 
     @property
     def known(self) -> int:
-        """How many vertices there are."""
+        """Number of vertices so far."""
         return len(self._places)
 
     @property
     def vertices(self) -> NDArray[np.uint8]:
-        """All of them [known, 2]."""
+        """Positions of the vertices on the lattice, uint8 [known, 2]."""
         return np.array(self._places, np.uint8)
 
     def at(self, vertex: int) -> Point:
-        """Where a vertex is."""
+        """Position of a vertex on the lattice."""
         return self._places[vertex]
 
     def _open(self, edge: Edge, by: int) -> None:
-        """Counts the gates that its ends are at."""
+        """Adds `by` to the number of gates of both ends of an edge."""
         for vertex in edge:
             self.open[vertex] += by
 
     def next_gate(self) -> tuple[Edge, int] | None:
-        """The next gate and the vertex on its near side."""
+        """Takes the next gate off the queue: the gate and its near vertex; None at the end."""
         while self.queue:
             edge = self.queue.popleft()
             if edge in self.waiting:
@@ -110,14 +125,18 @@ class Border:
         return None
 
     def predicted(self, edge: Edge, near: int) -> Point:
-        """The fourth corner of the parallelogram on the far side of a gate."""
+        """Predicted position beyond a gate: fourth corner of the parallelogram on its triangle."""
         (ax, ay), (bx, by), (x, y) = self.at(edge[0]), self.at(edge[1]), self.at(near)
         return ax + bx - x, ay + by - y
 
     def ranked(self, edge: Edge, near: int) -> Ints:
-        """The first vertices at gates that could close the triangle, nearest to the prediction.
+        """Ranks vertices that may be the third corner of the triangle beyond a gate.
 
-        Of equals the one that was added first; as many as there are symbols for.
+        These are the ends of other gates, if they lie on the far side of this one.
+
+        Returns:
+            int64 [n] the n <= `RANKS` of them that are nearest to the predicted position, nearest
+            first; at equal distance, the one that was added first.
         """
         at = np.flatnonzero(self.open[: self.known])
         x, y = self._x.take(at), self._y.take(at)
@@ -132,7 +151,11 @@ class Border:
         return ranked
 
     def place_triangle(self, a: int, b: int, c: int) -> bool:
-        """Adds a triangle; false if it is not positive or an edge of it is taken."""
+        """Adds a triangle, and opens and closes gates.
+
+        Returns:
+            Whether it could be added: its area is positive, and none of its directed edges is used.
+        """
         (ax, ay), (bx, by), (cx, cy) = self.at(a), self.at(b), self.at(c)
         edges = ((a, b), (b, c), (c, a))
         if (bx - ax) * (cy - ay) <= (by - ay) * (cx - ax) or not self.used.isdisjoint(edges):
@@ -150,7 +173,7 @@ class Border:
 
 
 class _Encoder:
-    """Says a mesh triangle by triangle."""
+    """Encoder of a mesh, triangle by triangle."""
 
     def __init__(self, vertices: NDArray[np.uint8], triangles: NDArray[np.int32]) -> None:
         self._vertices, self._triangles = vertices, triangles.tolist()
@@ -159,12 +182,12 @@ class _Encoder:
         self._symbols: list[int] = []
         self._far: list[int] = []
         self._residuals: list[Point] = []
-        # Numbers of vertices in the file by those in the mesh, and the other way round.
+        # Number of each vertex in the file by its number in the mesh, and the other way round.
         self._new: dict[int, int] = {}
         self._old: list[int] = []
 
     def fields(self) -> dict[str, Any]:
-        """The fields of MESH that say it."""
+        """Encodes the mesh as fields of MESH."""
         for corners in self._triangles:
             if not self._is_coded(corners):
                 self._start(corners)
@@ -189,7 +212,7 @@ class _Encoder:
         return (self._new.get(a, -1), self._new.get(b, -1)) in self._border.used
 
     def _start(self, corners: list[int]) -> None:
-        """The first triangle of a component: three vertices, each expected where the last is."""
+        """Codes the first triangle of a component; each vertex is predicted by the one before."""
         last, placed = (0, 0), []
         for vertex in corners:
             placed.append(self._put(vertex, last, None))
@@ -197,7 +220,7 @@ class _Encoder:
         self._place(*placed)
 
     def _cross(self, gate: Edge, near: int) -> None:
-        """What lies beyond a gate: the border, or a triangle."""
+        """Codes what lies beyond a gate: the border, or a triangle."""
         x, y = gate
         apex = self._beyond.get((self._old[y], self._old[x]))
         if apex is None:
@@ -207,7 +230,13 @@ class _Encoder:
         self._place(y, x, self._put(apex, expected, ranked))
 
     def _put(self, vertex: int, expected: Point, ranked: Ints | None) -> int:
-        """Says which vertex comes, and gives its number in the file."""
+        """Codes a vertex of the mesh, and returns its number in the file.
+
+        Args:
+            vertex: Number of the vertex in the mesh.
+            expected: Predicted position.
+            ranked: Ranked vertices of the gate; None in the first triangle of a component.
+        """
         if vertex not in self._new:
             return self._put_new(vertex, expected)
         number = self._new[vertex]
@@ -233,7 +262,7 @@ class _Encoder:
 
 
 class _Decoder:
-    """Finds out a mesh triangle by triangle."""
+    """Decoder of a mesh, triangle by triangle; raises `FormatError` if the fields are corrupt."""
 
     def __init__(self, fields: Mapping[str, Any], where: str) -> None:
         self._where, self._count, gates = where, fields["vertices"], fields["gates"]
@@ -247,7 +276,7 @@ class _Decoder:
         self._triangles: list[Triangle] = []
 
     def mesh(self) -> tuple[NDArray[np.uint8], NDArray[np.int32]]:
-        """Its vertices and triangles."""
+        """Decodes vertices uint8 [V, 2] and triangles int32 [T, 3]."""
         try:
             for symbol in self._symbols:
                 self._start(symbol)
@@ -263,7 +292,7 @@ class _Decoder:
         return self._border.vertices, np.array(self._triangles, np.int32)
 
     def _start(self, symbol: int) -> None:
-        """The first triangle of a component: three vertices, each expected where the last is."""
+        """Decodes the first triangle of a component; each vertex is predicted by the one before."""
         last, placed = (0, 0), []
         for k in range(3):
             placed.append(self._get(next(self._symbols) if k else symbol, last, None))
@@ -271,7 +300,7 @@ class _Decoder:
         self._place(*placed)
 
     def _cross(self, gate: Edge, near: int) -> None:
-        """What lies beyond a gate: the border, or a triangle."""
+        """Decodes what lies beyond a gate: the border, or a triangle."""
         x, y = gate
         symbol = next(self._symbols)
         if symbol == BORDER:
@@ -281,7 +310,14 @@ class _Decoder:
         self._place(y, x, self._get(symbol, expected, ranked))
 
     def _get(self, symbol: int, expected: Point, ranked: Ints | None) -> int:
-        """The number of the vertex that comes."""
+        """Decodes a vertex, and returns its number.
+
+        Args:
+            symbol: The symbol that stands for it.
+            expected: Predicted position.
+            ranked: Ranked vertices of the gate; None if the symbol needs none, or in the first
+                triangle of a component.
+        """
         if symbol == NEW:
             return self._get_new(expected)
         if symbol == FAR:
@@ -310,7 +346,7 @@ class _Decoder:
 
 
 def _beyond(triangles: list[list[int]]) -> dict[Edge, int]:
-    """For each directed edge the third corner of its triangle."""
+    """Third corner of the triangle of each directed edge; `ValueError` if an edge occurs twice."""
     found: dict[Edge, int] = {}
     for a, b, c in triangles:
         found |= {(a, b): c, (b, c): a, (c, a): b}
@@ -320,5 +356,5 @@ def _beyond(triangles: list[list[int]]) -> dict[Edge, int]:
 
 
 def _wrapped(difference: int) -> int:
-    """The difference modulo 256 in -128..127."""
+    """Difference modulo 256, in -128..127."""
     return (difference + 128) % 256 - 128

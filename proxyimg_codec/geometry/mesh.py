@@ -1,8 +1,8 @@
-"""Proxy nodes: a triangle mesh over a layer at rest, refined 1 to 4, and its coding.
+"""Proxy nodes: a triangle mesh over a layer at rest, its refinement, and its coding.
 
-Hierarchy 1 is a *base* of triangles whose vertices lie on a 256 x 256 lattice. Split flags refine
-triangles into four, level by level; what remains uneven is closed, so that the *faces* conform.
-A file stores vertices, connectivity and flags; no decoder ever runs a mesher.
+Hierarchy 1 is a *base* of triangles whose vertices lie on a 256 x 256 lattice. Split flags divide
+triangles into four, level by level. Then triangles beside divided ones are closed, so that the
+*faces* conform. A file stores vertices, connectivity and flags; no decoder ever runs a mesher.
 """
 
 from __future__ import annotations
@@ -23,23 +23,23 @@ from . import connectivity
 Ints = NDArray[np.int64]
 
 FRACTION_BITS = 10
-"""Node positions and all posed geometry are in 1/1024 canvas pixel."""
+"""Fractional bits of node positions and all posed geometry: they are in 1/1024 canvas pixel."""
 
 LEVELS_MAX = 4
-"""Most refinements of a base triangle."""
+"""Most levels of refinement."""
 
 
 @dataclass(frozen=True, eq=False)
 class Base:
-    """Hierarchy 1.
+    """Base of a mesh: hierarchy 1, before refinement.
 
     Attributes:
         origin: x, y of lattice point (0, 0) in whole canvas pixels.
         step: Lattice spacing across and down in 1/1024 canvas pixel; a multiple of 2**levels keeps
             all midpoints exact.
-        vertices: uint8 [V, 2] x, y on the lattice.
-        triangles: int32 [T, 3], all with (b - a) x (c - a) > 0 (x right, y down); every directed
-            edge occurs once at most.
+        vertices: uint8 [V, 2] x, y of the vertices on the lattice.
+        triangles: int32 [T, 3] vertices of the triangles, all with (b - a) x (c - a) > 0 (x right,
+            y down). Every directed edge occurs at most once.
     """
 
     origin: tuple[int, int]
@@ -49,19 +49,20 @@ class Base:
 
     @property
     def positions(self) -> Ints:
-        """int64 [V, 2] in 1/1024 canvas pixel."""
+        """Rest positions of the vertices, int64 [V, 2] in 1/1024 canvas pixel."""
         corner = np.array(self.origin, np.int64) << FRACTION_BITS
         return corner + self.vertices.astype(np.int64) * np.array(self.step, np.int64)
 
 
 @dataclass(frozen=True, eq=False)
 class Refined:
-    """All nodes, and the triangles that cover the layer once.
+    """Refined mesh: all nodes, and faces that cover the layer once.
 
     Attributes:
         nodes: int64 [N, 2] rest positions in 1/1024 canvas pixel: the vertices of the base, then
             midpoints, level by level.
-        parents: int32 [N, 2] the nodes that a midpoint lies between; of a vertex itself.
+        parents: int32 [N, 2] two nodes that a midpoint lies between; for a vertex of the base, the
+            vertex itself twice.
         faces: int32 [F, 3] conforming triangles, in the order of the base triangles.
     """
 
@@ -71,10 +72,15 @@ class Refined:
 
 
 class Mesh:
-    """A layer's mesh: its coded fields, decoded when first needed.
+    """Mesh of a layer: coded fields, which are decoded when they are first needed.
+
+    Args:
+        fields: Fields of MESH, without the number of the layer.
+        where: Name of the chunk in error messages.
+        budget: Running budget of the file; by default a new one.
 
     Attributes:
-        fields: Of the MESH chunk, without the layer.
+        fields: Fields of MESH, without the number of the layer.
     """
 
     def __init__(
@@ -89,22 +95,25 @@ class Mesh:
 
     @staticmethod
     def build(base: Base) -> Mesh:
-        """The mesh of a base whose vertices and triangles come in any order.
+        """Encodes a base as a mesh without refinement.
+
+        Coding changes the order of vertices and triangles; see `base` for the new one.
 
         Raises:
-            ValueError: A triangle is not positive, a directed edge occurs twice, or a vertex
-                belongs to no triangle.
+            ValueError: A triangle does not have positive area, a directed edge occurs twice, or a
+                vertex belongs to no triangle.
         """
         placed = {"origin": list(base.origin), "step": list(base.step)}
         coded = connectivity.encode(base.vertices, base.triangles)
         return Mesh({**placed, **coded, "levels": 0, "splits": b""})
 
     def split(self, flags: Sequence[NDArray[np.bool_]]) -> Mesh:
-        """The mesh with other split flags.
+        """Returns the mesh with other split flags.
 
         Args:
-            flags: For each level which triangles become four: bool [T] for `base`, then [4 n] for
-                the children of the n triangles that were split, in their order.
+            flags: For each level, True for triangles that become four: bool [T] for the triangles
+                of `base`, then bool [4 n] for the children, in order, of the n that were split.
+                Levels without any are left out.
         """
         kept = [f for f in flags if f.any()]
         data = b""
@@ -117,7 +126,7 @@ class Mesh:
 
     @cached_property
     def base(self) -> Base:
-        """Hierarchy 1 in the order of the file.
+        """Base of the mesh, in the order of the file.
 
         Raises:
             FormatError: The coded mesh is corrupt.
@@ -128,10 +137,11 @@ class Mesh:
 
     @cached_property
     def splits(self) -> list[NDArray[np.bool_]]:
-        """Split flags of each level, in the order of the file.
+        """Split flags of each level, bool [triangles of the level], in the order of the file.
 
         Raises:
-            FormatError: They are corrupt.
+            FormatError: The coded mesh is corrupt.
+            LimitError: The mesh has more faces than the budget allows.
         """
         data, at = self.fields["splits"], 0
         flags, count = [], len(self.base.triangles)
@@ -151,23 +161,27 @@ class Mesh:
 
     @cached_property
     def refined(self) -> Refined:
-        """Nodes and faces.
+        """Nodes and faces of the refined mesh.
 
         Raises:
             FormatError: The coded mesh is corrupt.
-            LimitError: It has too many faces.
+            LimitError: The mesh has more faces than the budget allows.
         """
         return refine(self.base, self.splits)
 
 
 def refine(base: Base, splits: Sequence[NDArray[np.bool_]]) -> Refined:
-    """Splits triangles 1 to 4 by flags, then closes those that have a split edge.
+    """Splits triangles into four by flags, then closes triangles that have a split edge.
 
-    The four children of a, b, c with midpoints d (of ab), e (bc), f (ca) are (a, d, f), (d, b, e),
-    (f, e, c), (d, e, f). Midpoints of a level are numbered by ascending (smaller, larger) end.
-    Faces stand in the order of the base triangles that they lie in, so that where a bent mesh
-    overlaps, whole parts of it win. Within one: unsplit triangles level by level, the last
-    children, and closing triangles last.
+    The children of the triangle (a, b, c) with midpoints d of ab, e of bc and f of ca are
+    (a, d, f), (d, b, e), (f, e, c), (d, e, f). Midpoints of a level are numbered by ascending ends
+    (smaller, larger). Faces are in the order of the base triangles that they lie in, so that whole
+    parts of a bent mesh win where it overlaps. Within a base triangle, unsplit triangles come
+    first, level by level, then the children of the last level, then closing triangles.
+
+    Args:
+        base: Base of the mesh.
+        splits: Split flags of each level, as for `Mesh.split`.
     """
     nodes = base.positions
     parents = np.repeat(np.arange(len(nodes), dtype=np.int32)[:, None], 2, axis=1)
@@ -196,12 +210,21 @@ def refine(base: Base, splits: Sequence[NDArray[np.bool_]]) -> Refined:
 
 
 def _edges(triangles: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Edges ab, bc, ca [T, 3, 2]."""
+    """Edges ab, bc and ca of triangles, int32 [T, 3, 2]."""
     return np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2)
 
 
 def _midpoints(parents: NDArray[np.int32], vertices: int, ends: NDArray[np.int32]) -> Ints:
-    """The midpoint of each edge `ends` [M, 2], or -1 where it has none."""
+    """Finds the midpoints of edges.
+
+    Args:
+        parents: int32 [N, 2] parents of all nodes so far.
+        vertices: Number of vertices of the base.
+        ends: int32 [M, 2] nodes at the ends of the edges.
+
+    Returns:
+        int64 [M] midpoint of each edge; -1 if it has none.
+    """
     count = len(parents)
     if count == vertices or not len(ends):
         return np.full(len(ends), -1, np.int64)
@@ -216,9 +239,16 @@ def _midpoints(parents: NDArray[np.int32], vertices: int, ends: NDArray[np.int32
 def _close(
     triangles: NDArray[np.int32], origin: Ints, parents: NDArray[np.int32], vertices: int
 ) -> tuple[NDArray[np.int32], Ints]:
-    """Divides triangles at the midpoints on their edges until none is left inside an edge.
+    """Divides triangles at midpoints on their edges, until no node lies inside an edge.
 
-    Returns them with the base triangle that each lies in.
+    Args:
+        triangles: int32 [T, 3] triangles.
+        origin: int64 [T] base triangle that each lies in.
+        parents: int32 [N, 2] parents of all nodes.
+        vertices: Number of vertices of the base.
+
+    Returns:
+        int32 [F, 3] faces, and int64 [F] the base triangle that each lies in.
     """
     done, origins = [], []
     while True:

@@ -1,1 +1,1 @@
-"""What lies where a layer is hidden by those in front of it."""
+"""Completion: colours for the parts of a layer that other layers hide."""

@@ -1,9 +1,10 @@
-"""Background completion by optimization: the paper's alternative to diffusing hidden codes.
+"""Completion of the back layer by optimization: the paper's alternative to diffusion.
 
 Hidden codes of the back layer are interpolated from a small grid of max(8, W / DELTA) columns and
-max(8, H / DELTA) rows, which is fitted so that the decoded colours vary little: a total-variation
-term of weight GAMMA, BETA times stronger on the rims of what hides the layer (ProxyImg, background
-completion; rim = dilated xor eroded hidden region). The network and visible codes stay fixed.
+max(8, H / DELTA) rows. The grid is fitted so that the decoded colours vary little, by a
+total-variation term of weight GAMMA, which is BETA times stronger on the rims of the objects that
+hide the layer (ProxyImg, background completion; rim = dilated xor eroded hidden region). The
+network and visible codes stay fixed.
 """
 
 from __future__ import annotations
@@ -25,28 +26,32 @@ if TYPE_CHECKING:
     import torch
 
 GAMMA, BETA = 1e-3, 10.0
-"""Weight of the total variation, and its factor on rims (ProxyImg). Here nothing else is optimized
-with it, so that GAMMA itself hardly matters."""
+"""Weight of the total variation, and its factor on rims (ProxyImg). GAMMA itself hardly matters
+here, because nothing else is optimized together with this term."""
 
 DELTA = 64
-"""Canvas pixels a cell of the small grid; the paper leaves it open."""
+"""Side of a cell of the small grid in canvas pixels; the paper does not say it."""
 
 RIM = 3
-"""Half width of a rim in pixels."""
+"""Half the width of a rim in pixels."""
 
 STEPS, BATCH, RATE = 300, 2048, 1e-2
+"""Optimizer steps, pixels per step, and learning rate."""
 
 
 def complete(
     problem: Problem, state: State, stored: NDArray[np.bool_], settings: Settings
 ) -> NDArray[np.bool_]:
-    """Sets the hidden codes of the back layer in `state`; returns its new mask of stored codes.
+    """Optimizes the hidden codes of the back layer, in place.
 
     Args:
-        problem: Its plane 0 is the back layer, covering the canvas.
-        state: Fitted and with quantization steps.
-        stored: bool [rows, columns] codes of the back layer that visible pixels touch.
-        settings: For the seed.
+        problem: Fitting problem whose first plane is that of the back layer and covers the canvas.
+        state: Fitted state with quantization steps; its codes are changed.
+        stored: bool [rows, columns], True at codes of the back layer that visible pixels depend on.
+        settings: Settings of the encoder, for the seed.
+
+    Returns:
+        bool [rows, columns], True at codes of the back layer that the file has to store: all.
 
     Raises:
         UnsupportedError: torch is not installed.
@@ -57,7 +62,7 @@ def complete(
         import torch
     except ImportError:
         raise UnsupportedError("--background complete needs torch") from None
-    torch.set_num_threads(1)  # sums, and so the file, would depend on the number of threads
+    torch.set_num_threads(1)  # the order of sums, and so the file, depends on the number of threads
     plane = problem.planes[0]
     codes = _Codes(plane, state, stored)
     pixels, weight = _hidden_pixels(plane, stored)
@@ -78,10 +83,10 @@ def complete(
 
 
 class _Codes:
-    """Codes of the back layer: visible ones stay, hidden ones come from a small grid.
+    """Codes of the back layer: visible ones stay, hidden ones are interpolated from a small grid.
 
     Attributes:
-        small: float32 [1, D, h, w] the small grid, which starts as the diffused codes.
+        small: float32 [1, D, h, w] small grid, which starts as the diffused codes.
     """
 
     def __init__(self, plane: Plane, state: State, stored: NDArray[np.bool_]) -> None:
@@ -98,7 +103,7 @@ class _Codes:
         self.small = (self.small * self._step[None, :, None, None]).requires_grad_()
 
     def all(self) -> torch.Tensor:
-        """Codes [rows * columns, D]; hidden ones are rounded, straight through."""
+        """Codes float32 [rows * columns, D]; hidden ones are rounded, straight through."""
         import torch
 
         full = _resized(self.small, self._size)
@@ -109,14 +114,14 @@ class _Codes:
 
 
 def _resized(grid: torch.Tensor, size: tuple[int, ...]) -> torch.Tensor:
-    """A grid [1, D, h, w] of another size, interpolated."""
+    """Interpolates a grid [1, D, h, w] bilinearly to another height and width."""
     import torch
 
     return torch.nn.functional.interpolate(grid, size, mode="bilinear", align_corners=True)
 
 
 def _network(problem: Problem, state: State) -> list[torch.Tensor]:
-    """Weights [out, in], as they will be stored, and biases [out] of each linear layer in turn."""
+    """Weights [out, in], as the file will have them, and biases [out] of each layer in turn."""
     import torch
 
     ends = np.cumsum([outputs for _, outputs in problem.shape.layers])[:-1]
@@ -129,7 +134,11 @@ def _network(problem: Problem, state: State) -> list[torch.Tensor]:
 
 
 def _hidden_pixels(plane: Plane, stored: NDArray[np.bool_]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Pixels (y, x) [N, 2] that touch hidden codes, and their weights."""
+    """Pixels near hidden codes.
+
+    Returns:
+        int64 [N, 2] y and x of the pixels, and float32 [N] weights of their variation.
+    """
     width, height = plane.box[2:]
     size = (width, height)
     unknown = cv2.resize((~stored).astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)
@@ -148,7 +157,16 @@ def _variation(
     weight: NDArray[Any],
     octaves: int,
 ) -> torch.Tensor:
-    """Weighted mean absolute difference of colour between pixels and their neighbours."""
+    """Weighted mean absolute difference of colour between pixels and their neighbours.
+
+    Args:
+        codes: float32 [rows * columns, D] codes of the plane.
+        net: Weights and biases of the network in turn.
+        plane: Plane of the back layer.
+        pixels: int64 [N, 2] y and x of pixels; the neighbours lie to the right and below.
+        weight: float32 [N] weights of the pixels.
+        octaves: Octaves of the frequency encoding.
+    """
     import torch
 
     from ..implicit.fit_torch import interpolate, run_network

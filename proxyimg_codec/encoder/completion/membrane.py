@@ -1,4 +1,4 @@
-"""Smooth continuation of what is known into what is not: a screened membrane."""
+"""Smooth continuation of known values into their surroundings: a screened membrane."""
 
 from __future__ import annotations
 
@@ -8,20 +8,27 @@ import numpy as np
 from ...texture.network import Floats
 
 KNOWN = 1e4
-"""Weight of values that are known; a neighbour weighs 1."""
+"""Weight of known values; each neighbour has the weight 1."""
 
 SWEEPS = 16
-"""Jacobi sweeps at each level."""
+"""Jacobi iterations at each level."""
 
 CROSS = np.array([[0, 1, 0], [1, 0, 1], [0, 1, 0]], np.float32)
 
 
 def continued(value: Floats, weight: Floats) -> Floats:
-    """Values [H, W, C] that are smooth and near `value` where it has weight [H, W].
+    """Continues values smoothly to places where they have little or no weight.
 
-    Minimizes approximately the squared differences of neighbours plus weight times those from
-    `value` (a screened membrane), by pull and push as the normative diffusion of codes: each level
-    halves the picture, is solved, and starts the finer one.
+    The result approximately minimizes the sum of squared differences of neighbours, and of `weight`
+    times the squared difference from `value`. It is found at half the size first, recursively; each
+    coarser solution is the start of the finer one, as in the diffusion of codes by decoders.
+
+    Args:
+        value: float32 [H, W, C] values.
+        weight: float32 [H, W] weights, not negative.
+
+    Returns:
+        float32 [H, W, C].
     """
     h, w = weight.shape
     start = value

@@ -1,7 +1,7 @@
-"""What a back layer learns where others hide it: the colours around, continued smoothly.
+"""Training pixels for the hidden part of a back layer: colours around it, continued smoothly.
 
-Without such pixels, codes at the rim of an object are bent by the few visible pixels they touch,
-and the network is free to make anything of the codes that decoders fill in between.
+Without them, codes at the rim of an object would be decided by the few visible pixels that depend
+on them, and the network could give any colour to the codes that decoders fill in between.
 """
 
 from __future__ import annotations
@@ -17,38 +17,42 @@ from ..implicit.fit_problem import Problem, entries_of, prior_of
 from .membrane import KNOWN, continued
 
 BAND = 6
-"""Pixels from the rim up to which all hidden pixels are learnt; these reach the stored codes."""
+"""Distance from the rim, in pixels, up to which all hidden pixels are learnt; some of these depend
+on stored codes."""
 
 LATTICE = 3
-"""Farther inside, one pixel in LATTICE x LATTICE is enough: codes there are smooth."""
+"""Farther inside, where codes are smooth, one pixel in LATTICE x LATTICE is learnt."""
 
 RIM = 8.0
-"""Weight of visible pixels at the rim, whose colour may be mixed with the front's."""
+"""Weight of visible pixels at the rim, whose colour may be mixed with that of the object."""
 
 
 @dataclass(frozen=True, eq=False)
 class Extended(Problem):
-    """A problem with hidden pixels after the visible ones.
+    """Fitting problem that has hidden pixels after the visible ones.
 
     Attributes:
-        seen: What the visible pixels touch.
+        seen: For each layer bool [rows, columns], True at codes that visible pixels depend on.
     """
 
     seen: tuple[NDArray[np.bool_], ...]
 
     def stored(self) -> list[NDArray[np.bool_]]:
-        """As without the hidden pixels: what they teach costs no codes."""
+        """For each layer bool [rows, columns], True at stored codes; hidden pixels add none."""
         return [mask.copy() for mask in self.seen]
 
 
 def extended(problem: Problem, width: int, height: int, spacing: float) -> Problem:
-    """The problem, and hidden pixels of the back layer, which it learns alone.
+    """Adds hidden pixels to a problem; only the back layer learns them.
 
     Args:
-        problem: Of a canvas that the back layer covers, so that it has all pixels in order.
-        width: Columns of the canvas.
-        height: Its rows.
-        spacing: Canvas pixels between codes.
+        problem: Problem with all pixels of the canvas in order, because the back layer covers it.
+        width: Width of the canvas in pixels.
+        height: Height of the canvas in pixels.
+        spacing: Distance of codes in canvas pixels.
+
+    Returns:
+        The extended problem; `problem` itself if nothing or everything of the back layer is hidden.
     """
     assert problem.pixels == width * height, "the back layer must cover the canvas"
     back = problem.planes[0]
@@ -78,16 +82,19 @@ def extended(problem: Problem, width: int, height: int, spacing: float) -> Probl
 
 
 def _lesson(picture: Floats, hidden: NDArray[np.bool_]) -> tuple[NDArray[np.int64], Floats]:
-    """Flat positions [N] of hidden pixels to learn and their colours [N, C].
+    """Chooses hidden pixels to learn.
 
     Args:
-        picture: [H, W, C] visible pixels.
-        hidden: bool [H, W], where something hides the back layer.
+        picture: float32 [H, W, C] visible colours.
+        hidden: bool [H, W], True where another layer hides the back layer.
+
+    Returns:
+        int64 [N] positions of the pixels, row by row, and float32 [N, C] their colours.
     """
     mask = hidden.astype(np.uint8)
     weight = np.where(cv2.dilate(mask, np.ones((3, 3), np.uint8)) > 0, RIM, KNOWN)
     colour = continued(picture, np.where(hidden, 0, weight).astype(np.float32))
-    # Rounding must not take a mean out of the range of its terms: flat pictures stay flat.
+    # Rounding must not carry a mean out of the range of its terms, so that flat pictures stay flat.
     colour = np.clip(colour, picture[~hidden].min(0), picture[~hidden].max(0))
     chosen = cv2.distanceTransform(mask, cv2.DIST_L2, 5) <= BAND
     chosen[LATTICE // 2 :: LATTICE, LATTICE // 2 :: LATTICE] = True

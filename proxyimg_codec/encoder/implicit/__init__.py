@@ -1,1 +1,1 @@
-"""Fitting codes and networks of implicit textures."""
+"""Fitting of the codes and networks of implicit textures."""

@@ -1,8 +1,8 @@
-"""Fitting codes and network to the pixels: float, then with quantization in the loop.
+"""Fit of codes and network to the pixels: in floating point, then with quantization in the loop.
 
-Optimization is Adam on random pixel batches, through the compositing, with a warm-up and a cosine
-decay. Batches grow with the picture, so that the number of steps does not, and cost a pixel is
-constant. The second half trains through rounding (straight-through estimator; Bengio 2013).
+Adam optimizes random batches of pixels, through the compositing, with a warm-up and a cosine decay.
+Batches grow with the picture; so the number of steps does not, and the cost per pixel is constant.
+The second half trains through rounding (straight-through estimator; Bengio 2013).
 """
 
 from __future__ import annotations
@@ -17,20 +17,21 @@ from .fit_problem import Problem
 from .state import Progress, State, Trainer, best_steps, rows_of
 
 LR_CODES, LR_NET = 1.2e-2, 8e-3
-"""Peak learning rates of the float phase."""
+"""Peak learning rates of codes and network in the floating-point phase."""
 
 QAT_LR_CODES, QAT_LR_NET = 1.2e-2, 6e-3
-"""Peak learning rates with quantization in the loop."""
+"""Peak learning rates of codes and network with quantization in the loop."""
 
 STEP_SCALE = 0.7
-"""Code steps below the least-squares step: finer steps gain more than clipping costs."""
+"""Quantization steps of codes relative to the least-squares steps: finer ones gain more than the
+clipping of codes costs."""
 
 INIT_CODES = 0.01
 """Standard deviation of initial codes."""
 
 
 def initial(problem: Problem, seed: int) -> State:
-    """Random codes and weights; the output bias is the mean colour."""
+    """Makes a state of random codes and weights; the output bias is the mean colour."""
     rng = np.random.default_rng(seed)
     shape = problem.shape
     codes = rng.standard_normal((problem.codes, shape.dim)).astype(np.float32) * INIT_CODES
@@ -49,7 +50,7 @@ def initial(problem: Problem, seed: int) -> State:
 
 
 def batch_size(pixels: int) -> int:
-    """Pixels a step: 1/128 of the picture, at least 256, in whole blocks of 256."""
+    """Pixels per step for a picture of `pixels`: 1/128 of them, as a multiple of 256."""
     return 256 * max(round(pixels / 128 / 256), 1)
 
 
@@ -67,7 +68,19 @@ def train(
     seed: int,
     progress: Progress | None = None,
 ) -> None:
-    """Optimizes `state` in place; batches are permutations of the pixels, epoch after epoch."""
+    """Optimizes a state, in place.
+
+    Batches are taken from random permutations of the pixels, one after the other.
+
+    Args:
+        problem: The fitting problem.
+        state: The state.
+        trainer: Trainer of the problem.
+        steps: Number of optimizer steps.
+        rates: Peak learning rates of codes and network.
+        seed: Seed of the permutations.
+        progress: Called with a number of steps that were done.
+    """
     rng = np.random.default_rng([seed, state.code_bits])
     batch = batch_size(problem.pixels)
     decay = _schedule(steps)
@@ -77,7 +90,7 @@ def train(
         while len(queue) < count * batch:
             queue = np.concatenate([queue, rng.permutation(problem.pixels).astype(np.int32)])
         pixels, queue = queue[: count * batch].reshape(count, batch), queue[count * batch :]
-        pixels.sort(axis=1)  # neighbours together: the trainer touches memory in order
+        pixels.sort(axis=1)  # so that the trainer reads memory in order
         part = decay[start : start + count]
         trainer.run(
             state,
@@ -90,7 +103,14 @@ def train(
 
 
 def choose_steps(problem: Problem, state: State, code_bits: int, net_bits: int) -> None:
-    """Sets quantization steps, rounded to float16, by least squares on the present parameters."""
+    """Chooses quantization steps by least squares on the present parameters, rounded to float16.
+
+    Args:
+        problem: The fitting problem.
+        state: The state; its steps and bits are set.
+        code_bits: Bits per code.
+        net_bits: Bits per weight.
+    """
     state.code_bits, state.net_bits = code_bits, net_bits
     for k, (plane, stored) in enumerate(zip(problem.planes, problem.stored(), strict=True)):
         codes = state.codes[plane.start : plane.start + plane.size][stored.ravel()]
@@ -102,7 +122,16 @@ def choose_steps(problem: Problem, state: State, code_bits: int, net_bits: int) 
 
 
 def make_trainer(problem: Problem, device: str, jobs: int) -> Trainer:
-    """The compiled trainer on a CPU where it was built, otherwise torch."""
+    """Makes a trainer: the compiled one on a CPU if it is available, otherwise that of torch.
+
+    Args:
+        problem: The fitting problem.
+        device: ``cpu`` or ``cuda``.
+        jobs: Number of threads.
+
+    Raises:
+        UnsupportedError: torch is needed and not installed, or finds no CUDA device.
+    """
     if device == "cpu" and kernel.available():
         from .fit_native import NativeTrainer
 
@@ -115,7 +144,7 @@ def make_trainer(problem: Problem, device: str, jobs: int) -> Trainer:
 def fit_float(
     problem: Problem, trainer: Trainer, steps: int, seed: int, progress: Progress | None = None
 ) -> State:
-    """Fits unquantized parameters from a random start."""
+    """Fits unquantized parameters from a random start, by `steps` steps of the optimizer."""
     state = initial(problem, seed)
     train(problem, state, trainer, steps, (LR_CODES, LR_NET), seed, progress)
     return state
@@ -131,7 +160,21 @@ def fit(
     jobs: int = 1,
     progress: Progress | None = None,
 ) -> State:
-    """Fits quantized parameters: half of the steps in float, half through rounding."""
+    """Fits quantized parameters: half of the steps in floating point, half through rounding.
+
+    Args:
+        problem: The fitting problem.
+        steps: Number of optimizer steps.
+        code_bits: Bits per code.
+        net_bits: Bits per weight.
+        seed: Seed of initial parameters and batches.
+        device: ``cpu`` or ``cuda``.
+        jobs: Number of threads.
+        progress: Called with a number of steps that were done.
+
+    Raises:
+        UnsupportedError: torch is needed and not installed, or finds no CUDA device.
+    """
     state = fit_float(problem, make_trainer(problem, device, jobs), steps // 2, seed, progress)
     choose_steps(problem, state, code_bits, net_bits)
     trainer = make_trainer(problem, device, jobs)

@@ -1,4 +1,4 @@
-"""Training with the compiled kernel (`native/train.h`)."""
+"""Trainer that uses the compiled kernel (`native/train.h`)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .state import State
 
 
 class _Train(ct.Structure):
-    """A training problem; mirrors `struct Train`."""
+    """Training problem; mirrors `struct Train` of the kernel."""
 
     _fields_ = [
         ("net", kernel.Net),
@@ -31,7 +31,12 @@ class _Train(ct.Structure):
 
 
 class NativeTrainer:
-    """A `Trainer` on the CPU; the result does not depend on the number of threads."""
+    """`Trainer` on the CPU, whose result does not depend on the number of threads.
+
+    Args:
+        problem: The fitting problem.
+        jobs: Most threads.
+    """
 
     def __init__(self, problem: Problem, jobs: int) -> None:
         self._problem = problem
@@ -45,14 +50,14 @@ class NativeTrainer:
     def run(
         self, state: State, pixels: NDArray[np.int32], lr_codes: Floats, lr_net: Floats
     ) -> float:
-        """Steps with batches `pixels` [steps, batch]; returns the mean loss."""
+        """Runs optimizer steps; see `Trainer.run`."""
         p, at, s = self._problem, kernel.pointer, self._problem.shape
         lib = kernel.library()
         assert lib is not None
         if not self._moments:
             self._moments = [np.zeros_like(a) for a in (state.codes,) * 2 + (state.weights,) * 2]
         m = self._moments
-        # Threads meet twice a step: not worth it for little work.
+        # Threads wait for each other twice a step, which does not pay for small batches.
         threads = min(self._jobs, max(pixels.shape[1] // 1024, 1))
         task = _Train(
             kernel.Net(s.dim, s.octaves, s.hidden, s.depth, s.channels),

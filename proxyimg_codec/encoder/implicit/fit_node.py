@@ -1,7 +1,7 @@
-"""Fitting with node sampling: float parameters with torch, then rounding by block reconstruction.
+"""Fit with node sampling: floating-point parameters by torch, then rounding by blocks.
 
-How ProxyImg trains is not known in full. Here it is as for direct sampling: Adam on random batches
-of pixels, through the compositing, with a warm-up and a cosine decay.
+The paper does not describe its training in full. Here it is the same as for direct sampling: Adam
+on random batches of pixels, through the compositing, with a warm-up and a cosine decay.
 """
 
 from __future__ import annotations
@@ -21,20 +21,28 @@ INIT_CODES = 0.03
 """Standard deviation of initial codes."""
 
 LR_CODES, LR_NET = 2e-3, 2e-3
-"""Peak learning rates."""
+"""Peak learning rates of codes and network."""
 
 FLOAT_SHARE = 2 / 3
-"""Share of the steps before rounding."""
+"""Share of the steps that fit floating-point parameters, before rounding."""
 
 CALIBRATION = 1 << 14
-"""Most points that the rounding looks at."""
+"""Most entries that rounding is calibrated on."""
 
 
 class NodeTrainer(TorchTrainer):
-    """Trains a `NodeProblem`."""
+    """`Trainer` of a `NodeProblem`, on one thread.
+
+    Args:
+        problem: The fitting problem.
+        device: ``cpu`` or ``cuda``.
+
+    Raises:
+        UnsupportedError: torch is not installed, or finds no CUDA device.
+    """
 
     def __init__(self, problem: NodeProblem, device: str) -> None:
-        # Sums, and so the file, would depend on the number of threads.
+        # With more threads, the order of sums, and so the file, would depend on their number.
         super().__init__(problem, device, jobs=1)
         self._layer = self.tensor(problem.layer)
         self._place = self.tensor(problem.place)
@@ -43,7 +51,7 @@ class NodeTrainer(TorchTrainer):
         self._anchors = [(first, self.tensor(at)) for first, at in problem.anchors]
 
     def features(self, codes: Any, entry: Any) -> Any:
-        """Features of entries, before the encoding."""
+        """Features [N, D] of the entries numbered `entry` [N], before the frequency encoding."""
         points = interpolate(codes, *self._taps)
         parts = []
         if self._corners.shape[1]:
@@ -67,7 +75,7 @@ class NodeTrainer(TorchTrainer):
 
 
 def initial(problem: NodeProblem, seed: int) -> State:
-    """Random codes and weights; the output bias is the mean colour."""
+    """Makes a state of random codes and weights; the output bias is the mean colour."""
     state = fit.initial(problem, seed)
     dim = problem.shape.dim // (bool(problem.anchors) + bool(problem.corners.shape[1]))
     scale = np.float32(INIT_CODES / fit.INIT_CODES)
@@ -83,7 +91,7 @@ def fit_float(
     seed: int,
     progress: Progress | None = None,
 ) -> State:
-    """Fits unquantized parameters from a random start."""
+    """Fits unquantized parameters from a random start, by `steps` steps of the optimizer."""
     state = initial(problem, seed)
     fit.train(problem, state, trainer, steps, (LR_CODES, LR_NET), seed, progress)
     return state
@@ -98,16 +106,16 @@ def quantize(
     seed: int,
     progress: Progress | None = None,
 ) -> None:
-    """Makes codes and weights of a float `state` multiples of steps, which it chooses.
+    """Quantizes a fitted state, in place.
 
     Args:
-        problem: What the state was fitted to.
-        trainer: Of the problem.
-        state: Changed in place.
-        bits: Bits a code and a weight.
+        problem: Problem that the state was fitted to.
+        trainer: Trainer of the problem.
+        state: The state. Its steps are chosen, and codes and weights become multiples of them.
+        bits: Bits per code and per weight.
         steps: Optimizer steps of the block reconstruction.
-        seed: Of everything random.
-        progress: Told how many steps were done.
+        seed: Seed of all random numbers.
+        progress: Called with a number of steps that were done.
     """
     fit.choose_steps(problem, state, *bits)
     plane = np.repeat(np.arange(len(problem.planes)), [p.size for p in problem.planes])
@@ -140,7 +148,20 @@ def fit_quantized(
     device: str = "cpu",
     progress: Progress | None = None,
 ) -> State:
-    """Fits float parameters, then rounds them; as `fit.fit` for direct sampling."""
+    """Fits floating-point parameters, then rounds them; like `fit.fit` for direct sampling.
+
+    Args:
+        problem: The fitting problem.
+        steps: Number of optimizer steps.
+        code_bits: Bits per code.
+        net_bits: Bits per weight.
+        seed: Seed of all random numbers.
+        device: ``cpu`` or ``cuda``.
+        progress: Called with a number of steps that were done.
+
+    Raises:
+        UnsupportedError: torch is not installed, or finds no CUDA device.
+    """
     trainer = NodeTrainer(problem, device)
     first = round(FLOAT_SHARE * steps)
     state = fit_float(problem, trainer, first, seed, progress)

@@ -1,4 +1,4 @@
-"""The fitting problem: which codes, with which weights, make each visible pixel."""
+"""Fitting problem of implicit textures: the codes, and their weights, that make each pixel."""
 
 from __future__ import annotations
 
@@ -17,15 +17,23 @@ from ..settings import LAYERS_MAX
 from ..shapes.coverage import coverage_of
 
 KNOWN = 0.25
-"""A code is known if its pixels weigh at least this share of a whole cell."""
+"""Weight of its pixels, relative to that of all pixels in a cell, from which on a code needs no
+prior."""
 
 PRIOR = 100.0
-"""Weight of the prior of a code that no pixel weighs on, times the number of pixels."""
+"""Weight of the prior, times the number of pixels, of a code whose pixels have no weight."""
 
 
 @dataclass(frozen=True, eq=False)
 class Plane:
-    """Where a layer's codes lie: its box, columns and rows, and its first row in the table."""
+    """Plane of the codes of a layer, as a part of the table of all codes.
+
+    Attributes:
+        box: Rectangle of the canvas that the plane is stretched over: x, y, width, height.
+        columns: Columns of the plane.
+        rows: Rows of the plane.
+        start: Table row of the first code.
+    """
 
     box: Box
     columns: int
@@ -40,12 +48,13 @@ class Plane:
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """Codes that little is known of, which are drawn to the mean of their neighbours.
+    """Prior of codes that pixels barely determine: they are near the mean of their neighbours.
 
     Attributes:
-        rows: int32 [P] rows of the table.
-        next: int32 [P, 4] rows of the neighbours; the code itself at the rim of its plane.
-        weight: float32 [P] weight of the squared distance.
+        rows: int32 [P] table rows of the codes.
+        next: int32 [P, 4] table rows of their neighbours; the code itself instead of neighbours
+            that do not exist or that no pixel depends on.
+        weight: float32 [P] weight of the squared distance from the mean.
     """
 
     rows: NDArray[np.int32]
@@ -55,22 +64,26 @@ class Prior:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Pixels, their entries (one per layer seen in the pixel, front to back), and targets.
+    """Fitting problem: pixels, their entries, and the colours that they should have.
+
+    An entry stands for one layer that shows in a pixel. The entries of a pixel are ordered front to
+    back.
 
     Attributes:
-        shape: The network.
-        planes: One a layer, back to front.
-        first: int32 [pixels + 1] range of entries of each pixel.
+        shape: Sizes of the decoder network.
+        planes: Plane of each layer, back to front.
+        first: int32 [pixels + 1] first entry of each pixel, and the number of entries.
         base: int32 [entries] table row of the upper left code.
-        stride: int32 [entries] table rows to the code below.
-        fx: float32 [entries] horizontal fraction.
-        fy: float32 [entries] vertical fraction.
-        coverage: float32 [entries] coverage of the layer, 0..1.
-        learn: float32 [entries] 1, or 0 where a layer shows through the rim of another: there
-            only the front layer learns, so that the one behind stays clean.
-        target: float32 [pixels, channels], premultiplied.
-        prior: Smoothness of codes that pixels barely determine.
-        areas: Visible pixels of each layer.
+        stride: int32 [entries] number of table rows to the code below.
+        fx: float32 [entries] horizontal fraction in 0..1.
+        fy: float32 [entries] vertical fraction in 0..1.
+        coverage: float32 [entries] coverage of the pixel by the layer, 0..1.
+        learn: float32 [entries] factor of the gradient, 0..1. It is 0 where a layer shows through
+            the rim of another: only the front layer learns from such a pixel, so that the mixed
+            colour does not stain the one behind.
+        target: float32 [pixels, channels] premultiplied colours in 0..1.
+        prior: Prior of codes that pixels barely determine.
+        areas: Number of visible pixels of each layer.
     """
 
     shape: NetShape
@@ -88,35 +101,43 @@ class Problem:
 
     @property
     def sampling(self) -> int:
-        """How features are found, as in LAYR."""
+        """Sampling mode of the layers, as in LAYR."""
         return DIRECT
 
     @property
     def codes(self) -> int:
-        """Rows of the table of codes."""
+        """Number of rows of the table of codes."""
         return self.planes[-1].start + self.planes[-1].size
 
     @property
     def pixels(self) -> int:
-        """Number of pixels that any layer covers."""
+        """Number of pixels to learn."""
         return len(self.target)
 
     def stored(self) -> list[NDArray[np.bool_]]:
-        """For each layer bool [rows, columns]: the codes that a visible pixel touches."""
+        """For each layer bool [rows, columns], True at codes that a visible pixel depends on."""
         touched = np.zeros(self.codes, bool)
         for offset in (0, 1):
             touched[self.base + offset] = True
             touched[self.base + self.stride + offset] = True
         for p in self.planes:
             if not touched[p.start : p.start + p.size].any():
-                touched[p.start] = True  # a layer that is hidden entirely keeps one code
+                touched[p.start] = True  # a layer that is wholly hidden keeps one code
         return [touched[p.start : p.start + p.size].reshape(p.rows, p.columns) for p in self.planes]
 
 
 def plane_for(
     boundary: Boundary | None, width: int, height: int, spacing: float, start: int
 ) -> Plane:
-    """The plane of a layer: its box is the boundary's, within the canvas."""
+    """Makes the plane of a layer, over the bounds of its boundary on the canvas.
+
+    Args:
+        boundary: Boundary at rest; None for the whole canvas.
+        width: Width of the canvas in pixels.
+        height: Height of the canvas in pixels.
+        spacing: Distance of codes in canvas pixels.
+        start: Table row of the first code.
+    """
     x0, y0, x1, y1 = (0, 0, width, height) if boundary is None else boundary.bounds()
     x0, y0 = min(max(x0, 0), width - 1), min(max(y0, 0), height - 1)
     x1, y1 = max(min(x1, width), x0 + 1), max(min(y1, height), y0 + 1)
@@ -130,12 +151,19 @@ def build(
     shape: NetShape,
     spacing: float,
 ) -> Problem:
-    """The problem of a picture [H, W, 4] (premultiplied) with layers back to front."""
+    """Makes the problem of a flat picture, whose layers learn what shows of them.
+
+    Args:
+        picture: float32 [H, W, 4] premultiplied picture in 0..1.
+        boundaries: Boundaries of the layers at rest, back to front; None for the whole canvas.
+        shape: Sizes of the decoder network.
+        spacing: Distance of codes in canvas pixels.
+    """
     height, width = picture.shape[:2]
     planes = _planes(boundaries, width, height, spacing)
     clear = np.ones(height * width, np.float32)
     rim = np.zeros(height * width, bool)
-    # Where a front layer is translucent, those behind show through and learn together with it.
+    # Layers that show through a translucent one learn together with it.
     solid = picture[..., 3].ravel() == 1 if shape.channels == 4 else np.True_
     seen: list[NDArray[np.int64]] = []
     parts: list[Entries] = []
@@ -166,14 +194,15 @@ def build_apart(
     spacing: float,
     size: tuple[int, int],
 ) -> Problem:
-    """The problem of layers that are known one by one: each learns all of its own pixels.
+    """Makes the problem of a layered picture, whose layers learn all of their own pixels.
 
     Args:
-        picture_of: The picture [H, W, 4] of layer k, straight alpha; clean under its outline.
-        boundaries: Of the layers, back to front.
-        shape: The network; without a fourth channel the alpha of pictures is that of outlines.
-        spacing: Canvas pixels between codes.
-        size: Width and height of the canvas.
+        picture_of: Makes the picture of a layer from its number: float32 [H, W, 4] in 0..1 with
+            straight alpha, whose colours continue beyond the rim.
+        boundaries: Boundaries of the layers at rest, back to front; None for the whole canvas.
+        shape: Sizes of the decoder network; without a fourth channel, alpha is left to boundaries.
+        spacing: Distance of codes in canvas pixels.
+        size: Width and height of the canvas in pixels.
     """
     width, height = size
     planes = _planes(boundaries, width, height, spacing)
@@ -186,13 +215,13 @@ def build_apart(
         at = np.flatnonzero(share > 0)
         target = picture_of(k).reshape(-1, 4)[at]
         if shape.channels == 4:
-            # What the outline's rim takes away counts already.
+            # Coverage will multiply alpha once more.
             target[:, 3] = np.minimum(target[:, 3] / share[at], 1)
             target[:, :3] *= target[:, 3:]
         else:
             target[:, 3] = 1
         targets.append(target[:, : shape.channels])
-        # A rim pixel is one to be sure of as far as it is covered.
+        # The less a pixel is covered, the less its colour can be trusted.
         parts.append(entries_of(plane, at, width, np.ones_like(share[at]), share[at]))
     entries = tuple(np.concatenate(p) for p in zip(*parts, strict=True))
     target = np.concatenate(targets)
@@ -200,7 +229,7 @@ def build_apart(
 
 
 Entries = tuple[NDArray[Any], ...]
-"""base, stride, fx, fy, coverage and learn of some entries, as in `Problem`."""
+"""Arrays base, stride, fx, fy, coverage and learn of some entries, as in `Problem`."""
 
 
 def _planes(
@@ -216,7 +245,15 @@ def _planes(
 def entries_of(
     plane: Plane, at: NDArray[Any], width: int, coverage: Floats, learn: Floats
 ) -> Entries:
-    """The entries of a layer in the pixels `at` [N] of a canvas of `width` columns."""
+    """Makes the entries of a layer.
+
+    Args:
+        plane: Plane of the layer.
+        at: int [N] positions of the pixels, row by row.
+        width: Width of the canvas in pixels.
+        coverage: float32 [N] coverage of the pixels by the layer.
+        learn: float32 [N] factors of the gradient.
+    """
     t = taps(at % width + 0.5, at // width + 0.5, plane.box, plane.columns, plane.rows)
     stride = np.full(len(at), t.stride, np.int32)
     return t.base + np.int32(plane.start), stride, t.fx, t.fy, coverage, learn
@@ -231,7 +268,7 @@ def _problem(
     target: Floats,
     areas: Sequence[int],
 ) -> Problem:
-    """The problem of entries, `counts` of them in each pixel."""
+    """Makes a problem of entries that are ordered by pixel; `counts` [pixels] has their numbers."""
     base, stride, fx, fy, coverage, learn = entries
     first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
     prior = prior_of(planes, spacing, len(counts), base, stride, fx, fy, coverage * learn)
@@ -251,7 +288,18 @@ def prior_of(
     fy: Floats,
     weight: Floats,
 ) -> Prior:
-    """The prior of all codes whose pixels weigh less than `KNOWN` of what inner codes see."""
+    """Makes the prior of all codes whose pixels have less than `KNOWN` of the weight of a cell.
+
+    Args:
+        planes: Plane of each layer.
+        spacing: Distance of codes in canvas pixels.
+        pixels: Number of pixels to learn.
+        base: int32 [entries] table row of the upper left code.
+        stride: int32 [entries] number of table rows to the code below.
+        fx: float32 [entries] horizontal fraction.
+        fy: float32 [entries] vertical fraction.
+        weight: float32 [entries] weight of the entry: coverage times factor of the gradient.
+    """
     total = planes[-1].start + planes[-1].size
     seen = np.zeros(total)
     touched = np.zeros(total, bool)

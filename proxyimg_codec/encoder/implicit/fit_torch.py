@@ -1,4 +1,4 @@
-"""Training with torch: for CUDA, and for installations without the compiled kernel."""
+"""Trainer that uses torch: for CUDA, and for installations without the compiled kernel."""
 
 from __future__ import annotations
 
@@ -16,7 +16,16 @@ from .state import State, rows_of
 
 
 class TorchTrainer:
-    """A `Trainer` on any torch device; same arithmetic as the kernel, other rounding."""
+    """`Trainer` on a torch device; the same as that of the kernel but for rounding errors.
+
+    Args:
+        problem: The fitting problem.
+        device: ``cpu`` or ``cuda``.
+        jobs: Most threads.
+
+    Raises:
+        UnsupportedError: torch is not installed, or finds no CUDA device.
+    """
 
     def __init__(self, problem: Problem, device: str, jobs: int) -> None:
         try:
@@ -43,13 +52,13 @@ class TorchTrainer:
         self._parameters: list[Any] = []
 
     def tensor(self, array: NDArray[Any]) -> Any:
-        """An array on the device; shares memory on a CPU."""
+        """Tensor of an array on the device; on a CPU both share their memory."""
         return self._torch.from_numpy(array).to(self._device)
 
     def run(
         self, state: State, pixels: NDArray[np.int32], lr_codes: Floats, lr_net: Floats
     ) -> float:
-        """Steps with batches `pixels` [steps, batch]; returns the mean loss."""
+        """Runs optimizer steps; see `Trainer.run`."""
         torch = self._torch
         flat = [a for pair in rows_of(self._shape, state.weights) for a in pair]
         if not self._parameters:
@@ -85,7 +94,7 @@ class TorchTrainer:
         return total / len(batches)
 
     def _clamp(self, steps: Any, bits: int) -> None:
-        """Keeps quantized codes near the range, so that a clamped code can come back."""
+        """Clamps codes to a little more than their quantized range, from which they can return."""
         if steps is not None:
             top = (1 << (bits - 1)) - 1
             with self._torch.no_grad():
@@ -97,7 +106,7 @@ class TorchTrainer:
         return x + (rounded - x).detach()
 
     def _loss(self, codes: Any, net: list[Any], batch: Any) -> Any:
-        """Mean squared error of the composited pixels `batch`."""
+        """Mean squared error of composited pixels; `batch` [B] has their numbers."""
         torch = self._torch
         start, count = self._first[batch], self._first[batch + 1] - self._first[batch]
         owner = torch.repeat_interleave(torch.arange(len(batch), device=batch.device), count)
@@ -120,18 +129,29 @@ class TorchTrainer:
         return ((result - self._target[batch]) ** 2).mean()
 
     def features(self, codes: Any, entry: Any) -> Any:
-        """Features of entries, before the encoding."""
+        """Features [N, D] of the entries numbered `entry` [N], before the frequency encoding."""
         return interpolate(codes, *(t[entry] for t in self._taps))
 
     def _smoothness(self, codes: Any) -> Any:
-        """Half the weighted squared distance of little known codes from their neighbours."""
+        """Prior: half the weighted squared distances of codes from the mean of their neighbours."""
         row, neighbours, weight = self._prior
         off = codes[row] - codes[neighbours].mean(1).detach()
         return (weight[:, None] * off**2).sum() / 2
 
 
 def interpolate(codes: Any, base: Any, stride: Any, fx: Any, fy: Any) -> Any:
-    """Features [N, D] by bilinear taps into codes [rows, D]."""
+    """Interpolates features bilinearly.
+
+    Args:
+        codes: float32 [rows, D] table of codes.
+        base: int [N] table row of the upper left code of each point.
+        stride: Number of table rows to the code below; an int, or int [N].
+        fx: float32 [N] horizontal fraction in 0..1.
+        fy: float32 [N] vertical fraction in 0..1.
+
+    Returns:
+        float32 [N, D] features.
+    """
     base, fx, fy = base.long(), fx[:, None], fy[:, None]
     below = base + stride
     top = codes[base] * (1 - fx) + codes[base + 1] * fx
@@ -139,7 +159,16 @@ def interpolate(codes: Any, base: Any, stride: Any, fx: Any, fy: Any) -> Any:
 
 
 def run_network(features: Any, net: list[Any], octaves: int) -> Any:
-    """Outputs [N, channels] of a network given as weights and biases in turn."""
+    """Runs a decoder network.
+
+    Args:
+        features: float32 [N, D] features.
+        net: Weights [out, in] and biases [out] of each layer in turn.
+        octaves: Octaves of the frequency encoding; 0 = none.
+
+    Returns:
+        float32 [N, channels] outputs.
+    """
     import torch
 
     x = [features]

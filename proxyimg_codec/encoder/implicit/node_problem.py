@@ -1,7 +1,7 @@
-"""The fitting problem of the paper's literal texture method: features from nodes and boundary.
+"""Fitting problem of node sampling, the paper's method: features from nodes and boundary.
 
-ProxyImg gives the sizes: one code of 16 features an 8 x 8 px cell, a back layer of 8 x 8 codes, 10
-octaves, four hidden layers of 64.
+The sizes are those of ProxyImg: one code of 16 features per cell of 8 x 8 px, 8 x 8 codes for the
+back layer, 10 octaves, and four hidden layers of width 64.
 """
 
 from __future__ import annotations
@@ -25,26 +25,30 @@ from ..shapes.layers import LayerPlan
 from .fit_problem import Plane, Prior, Problem
 
 DIM, OCTAVES, HIDDEN, DEPTH = 16, 10, 64, 4
-"""Features a code, octaves of the encoding, width and number of hidden layers (ProxyImg)."""
+"""Features per code, octaves of the encoding, width and number of hidden layers (ProxyImg)."""
 
 BACK_GRID = 8
-"""Codes across and down a back layer behind others (ProxyImg)."""
+"""Codes across and down a back layer, if it is not the only layer (ProxyImg)."""
 
 
 @dataclass(frozen=True)
 class NodeOptions:
-    """Variants of the method.
+    """Variants of node sampling.
 
     Attributes:
         edge: Whether the global feature is used.
-        local: ``multi`` (the local feature, of the refined triangles), ``single`` (of those of
-            hierarchy 1) or ``none``.
+        local: Local feature: ``multi`` from the refined triangles, ``single`` from those of
+            hierarchy 1, or ``none``.
         octaves: Octaves of the encoding.
-        cell: Canvas pixels a code.
-        back_grid: Codes across and down the back layer of several.
-        distance: Combine the nodes of a triangle by inverse squared distance, not by barycentric
-            weights. An experiment that no file can store.
-        own_codes: Each node has a code of its own instead of a sample of the plane. Likewise.
+        cell: Distance of codes in canvas pixels.
+        back_grid: Codes across and down a back layer, if it is not the only layer.
+        distance: Whether the nodes of a triangle are weighted by inverse squared distance instead
+            of barycentrically; an experiment that no file can store.
+        own_codes: Whether each node has a code of its own instead of a sample of the plane; an
+            experiment that no file can store.
+
+    Raises:
+        UsageError: There is neither a local nor a global feature, or `local` is unknown.
     """
 
     edge: bool = True
@@ -65,11 +69,11 @@ class NodeOptions:
         return self.local != "none"
 
     def network(self, channels: int) -> NetShape:
-        """The network."""
+        """Sizes of the decoder network, with 3 or 4 output channels."""
         return NetShape(DIM * (self.edge + self.meshed), self.octaves, HIDDEN, DEPTH, channels)
 
     def grid(self, plane: Plane, back: bool) -> tuple[int, int]:
-        """Columns and rows of a plane; `back` if it is the back layer of several."""
+        """Columns and rows of a plane; `back` if its layer is the back one of several."""
         if back:
             return self.back_grid, self.back_grid
         columns, rows = (max(round(n / self.cell), 2) for n in plane.box[2:])
@@ -78,18 +82,20 @@ class NodeOptions:
 
 @dataclass(frozen=True, eq=False)
 class NodeProblem(Problem):
-    """A problem whose entries share points at which the planes are sampled: nodes and anchors.
+    """Fitting problem of node sampling.
 
-    `base`, `stride`, `fx` and `fy` are the taps of the points [P].
+    Its entries share P points at which the planes are sampled: the nodes and anchors of all layers.
+    `base`, `stride`, `fx` and `fy` are [P], and belong to these points instead of entries.
 
     Attributes:
-        own: Rows of the table after those of the planes, for nodes with codes of their own.
-        layer: int32 [entries].
-        place: float32 [entries, 2] canvas position.
-        corners: int32 [entries, 3] points of the triangle; [entries, 0] without local feature.
-        weights: float32 [entries, 3] or [entries, 0].
-        anchors: For each layer its first point and float32 [S, 2] the anchors that begin there;
-            empty without global feature.
+        own: Number of table rows after those of the planes, for nodes with codes of their own.
+        layer: int32 [entries] layer of each entry.
+        place: float32 [entries, 2] canvas position of the pixel centre.
+        corners: int32 [entries, 3] points at the corners of the triangle; [entries, 0] without
+            local feature.
+        weights: float32 [entries, 3] weights of the corners; [entries, 0] without local feature.
+        anchors: For each layer the number of its first anchor among the points, and float32 [S, 2]
+            its anchors in canvas pixels; () without global feature.
     """
 
     own: int
@@ -101,38 +107,42 @@ class NodeProblem(Problem):
 
     @property
     def sampling(self) -> int:
-        """How features are found, as in LAYR."""
+        """Sampling mode of the layers, as in LAYR."""
         if not self.corners.shape[1]:
             return node_sampling.GLOBAL
         return node_sampling.BOTH if self.anchors else node_sampling.LOCAL
 
     @property
     def codes(self) -> int:
-        """Rows of the table of codes."""
+        """Number of rows of the table of codes."""
         return super().codes + self.own
 
 
 def options_for(settings: Settings) -> NodeOptions:
-    """The paper's sizes at quality 50, denser or sparser codes elsewhere."""
+    """Options that settings ask for: the paper's at quality 50, other spacings at others."""
     back = max(round(BACK_GRID * NODE_SPACING / settings.spacing), 2)
     return NodeOptions(cell=settings.spacing, back_grid=back)
 
 
 class _Points:
-    """Points at which planes are sampled, gathered layer by layer."""
+    """Points at which planes are sampled, collected layer by layer.
+
+    Attributes:
+        count: Number of points so far.
+    """
 
     def __init__(self) -> None:
         self.count = 0
         self._parts: list[tuple[int, NDArray[np.float64]]] = []
 
     def add(self, layer: int, points: NDArray[np.float64]) -> int:
-        """Appends points [n, 2] of a layer; returns the number of the first."""
+        """Appends points float64 [n, 2] of a layer; returns the number of the first."""
         self._parts.append((layer, points))
         self.count += len(points)
         return self.count - len(points)
 
     def taps(self, planes: Sequence[Plane]) -> list[NDArray[Any]]:
-        """base, stride, fx and fy of all points."""
+        """Arrays base, stride, fx and fy [count] of all points, as in `Problem`."""
         parts = []
         for k, points in self._parts:
             plane = planes[k]
@@ -145,13 +155,13 @@ class _Points:
 def build(
     problem: Problem, layers: Sequence[LayerPlan], size: tuple[int, int], options: NodeOptions
 ) -> NodeProblem:
-    """The problem of node sampling.
+    """Makes the problem of node sampling.
 
     Args:
-        problem: That of direct sampling, with any network and spacing.
-        layers: Back to front; with meshes, unless `options` has no local feature.
-        size: Width and height of the canvas.
-        options: Which variant.
+        problem: Problem of direct sampling of the same layers, with any network and spacing.
+        layers: Layers, back to front; they need meshes if there is a local feature.
+        size: Width and height of the canvas in pixels.
+        options: Variant of the method.
     """
     layer, place = _entries(problem)
     planes: list[Plane] = []
@@ -179,7 +189,7 @@ def build(
     base, stride, fx, fy = points.taps(planes)
     own = 0
     if options.own_codes:
-        own = nodes_end + 1  # one more: taps reach a row further, with weight 0
+        own = nodes_end + 1  # one more, because taps read the next row too, with weight 0
         base[:nodes_end] = planes[-1].start + planes[-1].size + np.arange(nodes_end)
         stride[:nodes_end] = fx[:nodes_end] = fy[:nodes_end] = 0
     values = {f.name: getattr(problem, f.name) for f in fields(Problem)} | {
@@ -194,7 +204,7 @@ def build(
 
 
 def _entries(problem: Problem) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Layer [entries] and pixel centre [entries, 2] of the entries of direct sampling."""
+    """Layer int32 [entries] and pixel centre float64 [entries, 2] of entries of direct sampling."""
     layer = np.searchsorted([p.start for p in problem.planes], problem.base, side="right") - 1
     place = np.zeros((len(layer), 2))
     for k, plane in enumerate(problem.planes):
@@ -209,7 +219,17 @@ def _entries(problem: Problem) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
 def _locate(
     mesh: Mesh, plane: Plane, place: NDArray[np.float64], distance: bool
 ) -> tuple[NDArray[np.int32], Floats]:
-    """Nodes [n, 3] and weights [n, 3] of pixel centres [n, 2]."""
+    """Finds the triangles of pixel centres.
+
+    Args:
+        mesh: Mesh of the layer.
+        plane: Plane of the layer, whose box the pixels lie in.
+        place: float64 [n, 2] pixel centres.
+        distance: Whether to weight by inverse squared distance instead of barycentrically.
+
+    Returns:
+        int32 [n, 3] nodes of the triangle of each, and float32 [n, 3] their weights.
+    """
     warp = Warp(REST, mesh, meshed=True)
     faces = warp.faces(np.zeros(2), np.ones(2), plane.box)
     column, row = (np.floor(place) - plane.box[:2]).astype(np.int64).T

@@ -1,9 +1,10 @@
-"""Quantization of a trained model by block reconstruction: which values round up, which down.
+"""Quantization of a trained model by block reconstruction: values are chosen to round up or down.
 
-BRECQ (Li et al. 2021): block after block, with the inputs that the quantized blocks before give, so
-that the outputs of each come near those of the float model on a few calibration points; an error
-counts by how much it changes the colour. AdaRound (Nagel et al. 2020): the choice between the two
-neighbouring integers is a sigmoid that is driven to 0 or 1. The target colours are not looked at.
+Blocks are rounded one after the other (BRECQ, Li et al. 2021). Each gets its inputs from the blocks
+that are quantized already, and its outputs should come near those of the floating-point model on
+some calibration points. Errors are weighted by how much they change the colour. The choice between
+two neighbouring integers is a sigmoid that is driven to 0 or 1 (AdaRound, Nagel et al. 2020). The
+target colours are not used.
 """
 
 from __future__ import annotations
@@ -18,27 +19,28 @@ from .fit_torch import run_network
 from .state import Progress
 
 BATCH = 1 << 10
-"""Calibration points a step."""
+"""Calibration points per step."""
 
 RATE, BIAS_RATE = 2e-2, 1e-3
-"""Learning rates of the choices and of biases."""
+"""Learning rates of choices and of biases."""
 
 STRETCH = 0.1
-"""The sigmoid is stretched by that much on either side, so that it reaches 0 and 1 (AdaRound)."""
+"""Length by which the sigmoid is stretched at either end, so that it reaches 0 and 1 (AdaRound)."""
 
 WARM_UP, SHARP, WEIGHT = 0.2, (20.0, 2.0), 1e-2
-"""Share of steps before choices are driven, first and last exponent and weight of the drive."""
+"""Share of the steps before choices are driven to 0 or 1; first and last exponent of the penalty
+that drives them; weight of the penalty."""
 
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """Float tensors of a model.
+    """Floating-point parameters of a model as tensors.
 
     Attributes:
-        codes: [rows, D].
-        code_steps: Quantization steps, of the shape of `codes`.
+        codes: [rows, D] codes.
+        code_steps: [rows, D] quantization steps of the codes.
         net: Weights [out, in] and biases [out] of each linear layer in turn.
-        row_steps: For each linear layer steps [out, 1].
+        row_steps: For each linear layer [out, 1] quantization steps of its weights.
         octaves: Octaves of the frequency encoding.
     """
 
@@ -50,12 +52,22 @@ class Model:
 
     @property
     def blocks(self) -> list[tuple[int, int]]:
-        """First and last + 1 linear layer of each block; the first includes the codes."""
+        """First and last + 1 linear layer of each block; the first block includes the codes."""
         layers = len(self.row_steps)
         return [(0, 1), *((k, min(k + 2, layers)) for k in range(1, layers, 2))]
 
     def activate(self, x: Any, net: list[Any], start: int, stop: int) -> Any:
-        """Outputs of layers `start` to `stop` - 1, whose parameters are `net`."""
+        """Runs the linear layers `start` to `stop` - 1 with activations.
+
+        Args:
+            x: [n, in] inputs.
+            net: Weights and biases of these layers in turn.
+            start: First layer.
+            stop: Last layer + 1.
+
+        Returns:
+            [n, out] outputs.
+        """
         import torch
 
         y = run_network(x, net, 0 if start else self.octaves)
@@ -63,7 +75,16 @@ class Model:
 
 
 class Choice:
-    """Values that are one of two neighbouring multiples of a step."""
+    """Choice, for each value, between the two multiples of a step beside it.
+
+    Args:
+        values: Tensor of values.
+        steps: Tensor of steps, which broadcasts with the values.
+        bits: Bits per quantized value.
+
+    Attributes:
+        logit: Trainable tensor of the shape of the values; a value rounds up if it is positive.
+    """
 
     def __init__(self, values: Any, steps: Any, bits: int) -> None:
         import torch
@@ -78,16 +99,16 @@ class Choice:
         return (self.logit.sigmoid() * (1 + 2 * STRETCH) - STRETCH).clamp(0, 1)
 
     def soft(self) -> Any:
-        """Values while choices are open."""
+        """Values that lie between both multiples while the choice is open; differentiable."""
         return (self._floor + self._share()).clamp(*self._range) * self._steps
 
     def hard(self) -> Any:
-        """Values as they will be stored."""
+        """Chosen multiples, as the file will have them."""
         chosen = self._floor + (self.logit.detach() > 0)
         return chosen.clamp(*self._range) * self._steps
 
     def drive(self, sharp: float) -> Any:
-        """How open the choices are."""
+        """Penalty for open choices: up to 1 for each, with the exponent `sharp`; 0 once made."""
         return (1 - (2 * self._share() - 1).abs() ** sharp).sum()
 
 
@@ -100,16 +121,20 @@ def reconstruct(
     seed: int,
     progress: Progress | None = None,
 ) -> tuple[Any, list[Any]]:
-    """Rounded codes and network: codes and weights are multiples of their steps.
+    """Rounds the codes and weights of a model to multiples of their steps.
 
     Args:
-        model: The float model.
-        features: Features of calibration points, from codes and the indices of the points.
+        model: The floating-point model.
+        features: Returns features [n, D] of calibration points, from codes and the numbers [n] of
+            the points.
         count: Number of calibration points.
-        bits: Bits a code and a weight.
-        steps: Optimizer steps, shared by the blocks.
-        seed: Of the batches.
-        progress: Told how many steps were done.
+        bits: Bits per code and per weight.
+        steps: Optimizer steps, divided among the blocks.
+        seed: Seed of the batches.
+        progress: Called with a number of steps that were done.
+
+    Returns:
+        [rows, D] codes; and the weights [out, in] and biases [out] of each layer in turn.
     """
     import torch
 
@@ -138,32 +163,38 @@ def reconstruct(
 
 @dataclass(frozen=True, eq=False)
 class _Goal:
-    """What a block of the float model gives.
+    """Goal of a quantized block: outputs of the same block of the floating-point model.
 
     Attributes:
-        outputs: [n, width] at the calibration points.
-        importance: [n, width] of a squared error there: the squared derivative of the colour,
-            summed over its channels.
+        outputs: [n, width] outputs at the calibration points.
+        importance: [n, width] weight of a squared error of each output: the squared derivative of
+            the colour by it, summed over channels.
     """
 
     outputs: Any
     importance: Any
 
     def loss(self, outputs: Any, at: Any) -> Any:
-        """The mean weighted squared error of outputs [batch, width] at points `at` [batch]."""
+        """Mean weighted squared error of outputs [batch, width] at the points `at` [batch]."""
         off = outputs - self.outputs[at]
         return (off**2 * self.importance[at]).sum(1).mean()
 
 
 class _Block:
-    """A block while its choices are open.
+    """Block that is being rounded.
 
     Attributes:
-        codes: The choice of the codes, in the first block.
+        codes: Choice of the codes in the first block; None in others.
     """
 
     def __init__(self, model: Model, span: tuple[int, int], bits: tuple[int, int]) -> None:
-        """The block of linear layers `span`: first, last + 1."""
+        """Opens the choices of a block.
+
+        Args:
+            model: The floating-point model.
+            span: First and last + 1 linear layer of the block.
+            bits: Bits per code and per weight.
+        """
         self._model, self._span = model, span
         layers = range(*span)
         self._weights = [Choice(model.net[2 * k], model.row_steps[k], bits[1]) for k in layers]
@@ -183,15 +214,15 @@ class _Block:
         rng: np.random.Generator,
         progress: Progress | None,
     ) -> None:
-        """Finds choices and biases.
+        """Optimizes choices and biases.
 
         Args:
-            inputs: Inputs of the block, from the codes if they are its own, and the indices of
-                calibration points.
-            goal: What its outputs should be.
+            inputs: Returns inputs [batch, in] of the block from codes, which are None if the block
+                does not include them, and numbers [batch] of calibration points.
+            goal: Goal of the outputs.
             steps: Optimizer steps.
-            rng: Draws the batches.
-            progress: Told how many steps were done.
+            rng: Generator that draws the batches.
+            progress: Called with a number of steps that were done.
         """
         import torch
 
@@ -216,23 +247,23 @@ class _Block:
                 progress(1)
 
     def _outputs(self, inputs: Callable[[Any, Any], Any], at: Any) -> Any:
-        """Outputs [batch, width] while choices are open."""
+        """Outputs [batch, width] at calibration points `at` [batch], while choices are open."""
         weights = [c.soft() for c in self._weights]
         x = inputs(None if self.codes is None else self.codes.soft(), at)
         net = [p for pair in zip(weights, self._biases, strict=True) for p in pair]
         return self._model.activate(x, net, *self._span)
 
     def rounded(self) -> list[Any]:
-        """Weights [out, in] as they will be stored, and biases [out], of each layer in turn."""
+        """Weights [out, in], as the file will have them, and biases [out] of each layer in turn."""
         weights = [c.hard() for c in self._weights]
         return [p.detach() for pair in zip(weights, self._biases, strict=True) for p in pair]
 
 
 def _goals(model: Model, features: Any) -> list[_Goal]:
-    """What each block should give.
+    """Goal of each block, from features [n, D] of the calibration points.
 
-    The importance of errors is the diagonal of the Gauss-Newton matrix, where BRECQ takes that of
-    the Fisher information.
+    The importance of errors is the diagonal of the Gauss-Newton matrix; BRECQ uses that of the
+    Fisher information matrix.
     """
     import torch
 

@@ -1,4 +1,4 @@
-"""The parameters that are fitted, and who fits them: what all trainers share."""
+"""State of a fit: its parameters and quantization steps, and the interface of trainers."""
 
 from __future__ import annotations
 
@@ -16,15 +16,16 @@ Progress = Callable[[int], None]
 
 @dataclass(eq=False)
 class State:
-    """Parameters and what quantization needs.
+    """Parameters of a fit, and their quantization.
 
     Attributes:
-        codes: float32 [rows, D].
-        weights: float32 [parameters], per layer [out][in] rows and then the biases.
-        code_steps: float32 [planes, D]; used with `code_bits` > 0.
-        row_steps: float32 [rows of the network].
-        code_bits: 0 = not quantized.
-        net_bits: Bits a weight.
+        codes: float32 [rows, D] codes of all planes.
+        weights: float32 [parameters] of the network: for each layer weights [out, in] row by row,
+            then biases [out].
+        code_steps: float32 [planes, D] quantization steps of codes; only used if `code_bits` > 0.
+        row_steps: float32 [rows of the network] quantization steps of the weights of each output.
+        code_bits: Bits per code; 0 = not quantized.
+        net_bits: Bits per weight; 0 = not quantized.
     """
 
     codes: Floats
@@ -36,16 +37,26 @@ class State:
 
 
 class Trainer(Protocol):
-    """Runs optimizer steps on a state; keeps Adam moments between calls."""
+    """Optimizer of a state, which keeps the moments of Adam between calls."""
 
     def run(
         self, state: State, pixels: NDArray[np.int32], lr_codes: Floats, lr_net: Floats
     ) -> float:
-        """Steps with batches `pixels` [steps, batch]; returns the mean loss."""
+        """Runs optimizer steps.
+
+        Args:
+            state: The state; it is changed.
+            pixels: int32 [steps, batch] numbers of the pixels of each step.
+            lr_codes: float32 [steps] learning rates of codes.
+            lr_net: float32 [steps] learning rates of the network.
+
+        Returns:
+            Mean loss of the steps.
+        """
 
 
 def rows_of(shape: NetShape, flat: Floats) -> list[tuple[Floats, Floats]]:
-    """Views (weights [out, in], biases [out]) of each layer in flat parameters."""
+    """Views of the weights [out, in] and biases [out] of each layer in flat parameters."""
     out, at = [], 0
     for inputs, outputs in shape.layers:
         middle = at + inputs * outputs
@@ -55,7 +66,15 @@ def rows_of(shape: NetShape, flat: Floats) -> list[tuple[Floats, Floats]]:
 
 
 def best_steps(values: Floats, bits: int) -> Floats:
-    """Step [N] that minimizes the squared rounding error of each row of `values` [N, M]."""
+    """Quantization steps with the least squared rounding error among a few candidates.
+
+    Args:
+        values: float32 [N, M] values.
+        bits: Bits per quantized value.
+
+    Returns:
+        float32 [N] a step for each row.
+    """
     top = (1 << (bits - 1)) - 1
     peak = np.abs(values).max(1, initial=0) + 1e-6
     best, error = peak / max(top, 1), np.full(len(values), np.inf)
@@ -68,6 +87,15 @@ def best_steps(values: Floats, bits: int) -> Floats:
 
 
 def quantize(values: Floats, steps: Floats, bits: int) -> NDArray[np.int8]:
-    """Integers round(values / steps), clamped to `bits` bits; half to even, as in training."""
+    """Quantizes values: values / steps, rounded half to even, clamped to `bits` bits with sign.
+
+    Args:
+        values: float32 values.
+        steps: float32 steps, which broadcast with the values.
+        bits: Bits per quantized value, 2..8.
+
+    Returns:
+        int8 array of the shape of `values`.
+    """
     top = (1 << (bits - 1)) - 1
     return np.asarray(np.clip(np.rint(values / steps), -top - 1, top), np.int8)

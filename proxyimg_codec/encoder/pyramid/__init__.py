@@ -1,1 +1,1 @@
-"""The encoder's side of the pyramid texture: the model in torch, and rate-distortion refinement."""
+"""Encoder of pyramid textures: the model in torch, and rate-distortion refinement of latents."""

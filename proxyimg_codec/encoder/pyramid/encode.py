@@ -1,4 +1,4 @@
-"""From pixels to planes: analysis, refinement in windows, entropy coding."""
+"""Encoding of a raster as planes: analysis, refinement in windows, entropy coding."""
 
 from __future__ import annotations
 
@@ -22,23 +22,29 @@ from .shifts import Sample, best_shift
 from .window import Window
 
 NUMBER = 1
-"""The registered model that is used."""
+"""Number of the registered model that is used."""
 
 CELL = 3
-"""Cells of the support have a side of 2**CELL samples."""
+"""Base-2 logarithm of the side of a cell of the support, in samples."""
 
 WINDOW, MARGIN = 768, 64
-"""Side in samples of what is refined at a time, and what it sees beyond that: bounds memory."""
+"""Side of a window in samples, and margin that it sees beyond that; refinement in windows bounds
+memory."""
 
 REACH = 256
-"""Samples that the analysis of a window sees beyond it: its coarsest filters are that long."""
+"""Samples that the analysis of a window sees beyond it, as many as its coarsest filters reach."""
 
 SPARSE = 3
-"""Shifts of the scale index are found on every third latent, across and down."""
+"""Distance of the latents, across and down, from which shifts of the scale index are found."""
 
 
 class Effort(NamedTuple):
-    """How long to refine: steps with stochastic rounding, then rounds of moves by one."""
+    """Duration of refinement.
+
+    Attributes:
+        steps: Steps with stochastic rounding.
+        rounds: Rounds of moves by one after them.
+    """
 
     steps: int
     rounds: int
@@ -48,16 +54,17 @@ EFFORTS = (
     Effort(0, 1), Effort(0, 2), Effort(0, 6), Effort(0, 15), Effort(0, 45), Effort(0, 80),
     Effort(0, 140), Effort(50, 150), Effort(300, 200),
 )  # fmt: skip
-"""At effort 1..9."""
+"""Duration of refinement at effort 1..9."""
 
 
 class Raster(NamedTuple):
-    """What planes should show.
+    """Raster to encode.
 
     Attributes:
-        samples: float32 [H, W, 3] in 0..255; grey has three equal components.
-        weight: float32 [H, W] of the squared error, or None for 1 everywhere.
-        cells: bool cells of `CELL` that get latents, or None for all.
+        samples: float32 [H, W, 3] samples in 0..255; grey ones have three equal components.
+        weight: float32 [H, W] weights of the squared errors; None = 1.
+        cells: bool [rows, columns], True for the cells of the support, which have latents; None =
+            all.
         grey: Whether only one component is coded.
         structural: Whether to aim at MS-SSIM instead of the squared error.
     """
@@ -70,27 +77,32 @@ class Raster(NamedTuple):
 
     @property
     def size(self) -> tuple[int, int]:
-        """Columns and rows."""
+        """Columns and rows of samples."""
         return self.samples.shape[1], self.samples.shape[0]
 
 
 def levels_for(size: tuple[int, int]) -> int:
-    """Levels of the pyramid: the lowest plane keeps a few samples."""
+    """Number of levels for a raster of `size` columns and rows: the lowest planes keep a few."""
     return max(min(LEVELS, (max(size) - 1).bit_length() - 2), 1)
 
 
 def encode(
     raster: Raster, step: int, effort: Effort, seed: int, tick: Callable[[int], None]
 ) -> tuple[Planes, bool]:
-    """Planes that show a raster, and whether refinement ran to its end.
+    """Encodes a raster.
+
+    On `KeyboardInterrupt`, in `tick` or elsewhere, refinement stops and its results so far are
+    kept.
 
     Args:
-        raster: What to show.
-        step: Quantization step, 2**(step / 64).
-        effort: How long to refine.
-        seed: Seed of the stochastic rounding.
-        tick: Called with the samples of a window after each step of its refinement. On
-            `KeyboardInterrupt`, here or in the refinement, what was found so far is kept.
+        raster: The raster.
+        step: Index s of the quantization step 2**(s / 64).
+        effort: Duration of refinement.
+        seed: Seed of all random numbers.
+        tick: Called with the number of samples of a window after each step of its refinement.
+
+    Returns:
+        The planes, and whether refinement ran to its end.
     """
     model = load(NUMBER)
     job = _Job(model, raster, step)
@@ -108,7 +120,16 @@ def encode(
 
 
 class _Job:
-    """Latents of one raster while they are refined."""
+    """Latents of a raster that are being refined.
+
+    Attributes:
+        picture: [1, 3, rows, columns] samples, padded to a multiple of 2**`count`.
+        weight: [1, 1, rows, columns] weights, 0 in the padding; None = 1.
+        support: For each level a mask [1, 9, h, w], 0 for latents that must be 0; None = all 1.
+        latents: Latents of levels 1, 2, ..., then the lowest planes.
+        shifts: Shifts of the scale index.
+        count: Number of levels.
+    """
 
     def __init__(self, model: Model, raster: Raster, step: int) -> None:
         self.model, self.raster, self.step_index = model, raster, step
@@ -142,7 +163,7 @@ class _Job:
 
     @torch.no_grad()
     def _analysed(self) -> list[Tensor]:
-        """Latents from the analysis, in windows."""
+        """Latents by the analysis, window by window."""
         unit = 1 << self.count
         _, _, rows, columns = self.picture.shape
         found = [
@@ -160,11 +181,11 @@ class _Job:
         return found
 
     def _depths(self) -> list[int]:
-        """Level of each array of latents; the lowest plane is as coarse as the last level."""
+        """Level of each array of latents; the lowest planes have the size of the last level."""
         return [*range(1, self.count + 1), self.count]
 
     def windows(self, reach: int = MARGIN) -> list[Window]:
-        """Windows that cover the raster, in reading order, and see `reach` samples beyond."""
+        """Windows that cover the raster, row by row, and see at least `reach` samples beyond."""
         unit = 1 << self.count
         _, _, rows, columns = self.picture.shape
         side = max(WINDOW // unit, 1) * unit
@@ -176,11 +197,11 @@ class _Job:
         ]
 
     def refine(self, box: Window, effort: Effort, seed: int, tick: Callable[[int], None]) -> None:
-        """Refines the latents of a window; those of windows before it stay."""
+        """Refines the latents of a window; those that earlier windows decided stay."""
         now = self._seen(box, self.latents)
         target = self._target(box, now)
         if self.raster.structural:
-            # Moves by one rely on the curvature of the squared error.
+            # Moves by one need the curvature of the squared error, so all turns become steps.
             target = refine.structural(self.model, target, now)
             effort = Effort(effort.steps + effort.rounds, 0)
 
@@ -197,7 +218,7 @@ class _Job:
             self._keep(box, self.latents, best)
 
     def _target(self, box: Window, now: list[Tensor]) -> Target:
-        """What the latents `now` of a window should show, and which of them may change."""
+        """Target of the latents `now` that a window sees."""
         rows, columns = box.outer
         free = None
         if box.partial:
@@ -209,21 +230,21 @@ class _Job:
         return Target(picture, weight, support, free, self.step, self.shifts)
 
     def _seen(self, box: Window, arrays: list[Tensor]) -> list[Tensor]:
-        """What a window sees of arrays of levels 1, 2, .., which may end with the lowest planes."""
+        """Parts that a window sees of arrays of levels 1, 2, ..., and maybe of lowest planes."""
         places = map(box.at, self._depths())
         return [y[:, :, i, j] for y, (i, j) in zip(arrays, places, strict=False)]
 
     def _keep(self, box: Window, arrays: list[Tensor], found: list[Tensor]) -> None:
-        """Puts what a window is responsible for, of what was found for all that it sees.
+        """Copies the inner part of arrays that a window found to the arrays of the raster.
 
-        What lies around has suffered from the edges of the window.
+        The margin is left out, because the edges of the window disturb it.
         """
         for whole, new, level in zip(arrays, found, self._depths(), strict=True):
             (i, j), within = box.at(level, inner=True), box.inside(level)
             whole[:, :, i, j] = new[:, :, within[0], within[1]]
 
     def planes(self) -> Planes:
-        """The coded planes of what was found."""
+        """Codes the present latents, rounded."""
         found = [torch.round(y) for y in self.latents]
         whole = [y[0].numpy().astype(np.int32) for y in found]
         r = self.raster
@@ -234,7 +255,7 @@ class _Job:
 
     @torch.no_grad()
     def _shifts(self) -> tuple[int, ...]:
-        """The shifts of the scale index that take the fewest bits for the present latents."""
+        """Shifts of the scale index with which the present latents take the fewest bits."""
         samples: list[list[Sample]] = [[] for _ in range(2 * self.count)]
         few = slice(None, None, SPARSE)
         for box in self.windows():
@@ -252,6 +273,6 @@ class _Job:
 
 
 def _tensor(values: NDArray[np.floating]) -> Tensor:
-    """[1, C, H, W], channels last in memory."""
+    """Tensor float32 [1, C, H, W] of an array [C, H, W], with channels last in memory."""
     whole = torch.from_numpy(np.ascontiguousarray(values, np.float32))[None]
     return whole.contiguous(memory_format=torch.channels_last)

@@ -1,4 +1,4 @@
-"""The registered model in torch, as the encoder needs it: exact weights, and the analysis."""
+"""Registered model in torch: the weights of the decoder, and the analysis of the encoder."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ from .model import Model
 
 @functools.lru_cache(maxsize=2)
 def load(number: int) -> Model:
-    """The registered model, weights as in the decoder.
+    """Loads the registered model of a number, with exactly the weights of the decoder.
 
-    Activations are not rounded to whole numbers as the decoder's: for refinement that is no gain.
+    Its activations are not rounded to integers as those of the decoder are: refinement does not
+    gain from that.
 
     Raises:
         UnsupportedError: There is no such model.

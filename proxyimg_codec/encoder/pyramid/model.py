@@ -1,4 +1,7 @@
-"""The pyramid model in torch: analysis, synthesis and context, as trained and as refined with."""
+"""Model of pyramid textures in torch: analysis, synthesis and context, for training and refinement.
+
+Arrays are tensors; B counts pictures. Latents of a level have 9 channels 3 * colour + band.
+"""
 
 from __future__ import annotations
 
@@ -13,25 +16,32 @@ from torch.nn import functional as F
 from .wavelet import analysis_weights, extended, reflected, synthesis_weights
 
 LEVELS = 6
+"""Most levels of a pyramid that is encoded."""
+
 SHARED_FROM = 4
-"""Levels from this one on use the same weights."""
+"""Levels from this one on share their weights."""
 
 STEP = 1 / 32
-"""Step of the context network's 8-bit activations."""
+"""Quantization step of the 8-bit activations of the context network."""
 
 LOG_SCALES = (-4.0, 3.875)
-"""Range of the log scale, in steps of 1/8."""
+"""Range of the natural logarithm of a scale; the tables have steps of 1/8."""
 
 
 class Likelihood(NamedTuple):
-    """Distribution of the latents of one level: mean and log scale [B, 9, H, W]."""
+    """Distributions of the latents of one level.
+
+    Attributes:
+        mean: [B, 9, h, w] means.
+        log_scale: [B, 9, h, w] natural logarithms of the scales.
+    """
 
     mean: Tensor
     log_scale: Tensor
 
 
 class _Through(torch.autograd.Function):
-    """Rounds to multiples of a step within bounds; the gradient passes inside the bounds."""
+    """Rounding to multiples of a step within bounds, inside which the gradient passes unchanged."""
 
     @staticmethod
     def forward(ctx: Any, x: Tensor, step: float, low: float, high: float) -> Tensor:
@@ -45,32 +55,37 @@ class _Through(torch.autograd.Function):
 
 
 def through(x: Tensor, step: float, low: float, high: float) -> Tensor:
-    """`x` rounded to multiples of `step` from low * step to high * step, straight through."""
+    """Rounds `x`, straight through, to multiples of `step` in low * step..high * step."""
     rounded: Tensor = _Through.apply(x, step, low, high)  # type: ignore[no-untyped-call]  # torch's stubs
     return rounded
 
 
 def squash(x: Tensor) -> Tensor:
-    """X / (1 + |x| / 4): the signed feature of a difference or a latent, within -4..4."""
+    """Signed feature x / (1 + |x| / 4) of a difference or a latent, in -4..4."""
     return x / (1 + x.abs() / 4)
 
 
 def soft(x: Tensor) -> Tensor:
-    """X / (1 + |x| / 8): input of the synthesis networks."""
+    """Input x / (1 + |x| / 8) of the synthesis and analysis networks, in -8..8."""
     return x / (1 + x.abs() / 8)
 
 
 def high_pass(x: Tensor) -> Tensor:
-    """X less the mean of its 3 x 3 neighbours, edges repeated."""
+    """Subtracts from planes [B, C, h, w] the mean of 3 x 3 samples around, with edges repeated."""
     return x - F.avg_pool2d(F.pad(x, (1, 1, 1, 1), mode="replicate"), 3, 1)
 
 
 class Model(nn.Module):
-    """All weights; see `Level`.
+    """Weights of all levels of a model, and its colour transforms.
+
+    Args:
+        hidden: Width of the hidden layers of synthesis and analysis.
+        context: Width of the hidden layers of the context network.
 
     Attributes:
-        integer: Whether the context network is simulated with 8-bit weights and activations.
-        fast: Whether convolutions of the networks run in bfloat16.
+        levels: Weights of the levels; the last are shared by all coarser levels.
+        to_planes: [3, 3] colour transform of the analysis.
+        to_colour: [3, 3] colour transform of the synthesis.
     """
 
     def __init__(self, hidden: int = 32, context: int = 32) -> None:
@@ -83,23 +98,38 @@ class Model(nn.Module):
 
     @property
     def sizes(self) -> tuple[int, int]:
-        """Hidden units of the synthesis and of the context."""
+        """Width of the hidden layers of the synthesis, and of the context network."""
         level = self.level(1)
         return level.synthesis.second.weight.shape[0], level.mix.weight.shape[0]
 
     def level(self, number: int) -> Level:
-        """Weights of a level, 1 = finest."""
+        """Weights of a level; 1 is the finest."""
         return self.levels[min(number, SHARED_FROM) - 1]  # type: ignore[return-value]  # torch's stubs
 
     def set_mode(self, *, integer: bool | None = None, fast: bool | None = None) -> None:
-        """Sets `integer` or `fast` of every level."""
+        """Sets modes of all levels; those that are None stay as they are.
+
+        Args:
+            integer: Whether to simulate the integers of the decoder: 8-bit weights, and activations
+                and outputs of the context network on their grids.
+            fast: Whether convolutions of the networks run in bfloat16.
+        """
         for level in self.levels:
             assert isinstance(level, Level)
             level.integer = level.integer if integer is None else integer
             level.fast = level.fast if fast is None else fast
 
     def analyse(self, picture: Tensor, step: Tensor, levels: int = LEVELS) -> list[Tensor]:
-        """Latents of pictures [B, 3, H, W] in 0..255: levels 1.. [B, 9, h, w], and the lowest."""
+        """Finds the latents of pictures, not rounded.
+
+        Args:
+            picture: [B, 3, H, W] pictures in 0..255; H and W are multiples of 2**levels.
+            step: [B] quantization steps.
+            levels: Number of levels.
+
+        Returns:
+            Latents [B, 9, h, w] of levels 1, 2, ..., then the lowest planes [B, 3, h, w].
+        """
         scale = step.view(-1, 1, 1, 1)
         q = log_step(step)
         low = torch.einsum("ij,bjhw->bihw", self.to_planes, (picture - 128) / scale)
@@ -113,12 +143,16 @@ class Model(nn.Module):
     def likelihoods(
         self, latents: list[Tensor], step: Tensor, shifts: Sequence[int] | None = None
     ) -> list[Likelihood]:
-        """Distributions of the latents of levels 1.., the lowest plane excepted.
+        """Finds the distributions of latents, without those of the lowest planes.
 
         Args:
-            latents: Latents of levels 1.., and the lowest plane.
-            step: Quantization steps [B].
-            shifts: Shift of the scale index per level: luma, chroma; None = 0.
+            latents: Latents [B, 9, h, w] of levels 1, 2, ..., then the lowest planes.
+            step: [B] quantization steps.
+            shifts: Shifts of the scale index for luma and chroma of level 1, then of level 2, and
+                so on; None = 0.
+
+        Returns:
+            Distributions of levels 1, 2, ...
         """
         q = log_step(step)
         low = latents[-1]
@@ -141,7 +175,10 @@ class Model(nn.Module):
         return found[::-1]
 
     def synthesise(self, latents: list[Tensor], step: Tensor) -> Tensor:
-        """Pictures [B, 3, H, W] in 0..255, neither rounded nor clipped."""
+        """Pictures [B, 3, H, W] of latents, in 0..255, neither rounded nor clipped.
+
+        `latents` and `step` are those of `likelihoods`.
+        """
         q = log_step(step)
         low = latents[-1]
         for number in range(len(latents) - 1, 0, -1):
@@ -151,7 +188,7 @@ class Model(nn.Module):
 
 
 def log_step(step: Tensor) -> Tensor:
-    """The networks' input for the quantization step: log2(step) / 2 - 293 / 128, [B, 1, 1, 1]."""
+    """Input of the networks for the steps [B]: log2(step) / 2 - 293 / 128, [B, 1, 1, 1]."""
     return (torch.log2(step) / 2 - 293 / 128).view(-1, 1, 1, 1)
 
 
@@ -159,7 +196,12 @@ _PLAIN: dict[torch.dtype, Tensor] = {}
 
 
 def plain_synthesis(low: Tensor, high: Tensor) -> Tensor:
-    """The next finer plane by the plain CDF 9/7 wavelet, which conditions the context."""
+    """Next finer planes [B, 3, 2h, 2w] by the plain CDF 9/7 wavelet, for the context network.
+
+    Args:
+        low: [B, 3, h, w] planes.
+        high: [B, 9, h, w] latents.
+    """
     weights = _PLAIN.setdefault(low.dtype, synthesis_weights().to(low.dtype))
     return F.pixel_shuffle(F.conv2d(extended(low, high), weights), 2)
 
@@ -167,9 +209,17 @@ def plain_synthesis(low: Tensor, high: Tensor) -> Tensor:
 class Level(nn.Module):
     """Weights of one level.
 
+    Args:
+        hidden: Width of the hidden layers of synthesis and analysis.
+        context: Width of the hidden layers of the context network.
+
     Attributes:
-        synthesis_delta, analysis_delta: What was learned beyond the CDF 9/7 wavelet.
-        gain, gain_by_step: Log gain of each band, and its slope by `log_step`.
+        integer: Whether the integers of the decoder are simulated; see `Model.set_mode`.
+        fast: Whether convolutions of the networks run in bfloat16.
+        synthesis_delta: [12, 12, 5, 5] learned difference from the synthesis of the wavelet.
+        analysis_delta: [12, 12, 5, 5] learned difference from the analysis of the wavelet.
+        gain: [9] natural logarithm of the gain of each band.
+        gain_by_step: [9] slope of that by `log_step`.
     """
 
     synthesis_base: Tensor
@@ -187,7 +237,7 @@ class Level(nn.Module):
         self.gain_by_step = nn.Parameter(torch.zeros(9))
         self.synthesis = Residual(12, hidden, 12)
         self.analysis = Residual(12, hidden, 12)
-        # Context
+        # Context network
         self.first = nn.Conv2d(12, context, 3)
         self.first_by_step = nn.Parameter(torch.zeros(context))
         self.second = nn.Conv2d(context, context, 3)
@@ -201,15 +251,15 @@ class Level(nn.Module):
         self.chroma = nn.Conv2d(context, 12, 1)
 
     def gains(self, q: Tensor) -> Tensor:
-        """Gains of the bands [B, 9, 1, 1]."""
+        """Gains of the bands, [B, 9, 1, 1], for a result of `log_step`."""
         return torch.exp(self.gain.view(1, 9, 1, 1) + self.gain_by_step.view(1, 9, 1, 1) * q)
 
     def gains_at(self, step: Tensor) -> Tensor:
-        """Gains of the bands at quantization steps [B]: [B, 9, 1, 1]."""
+        """Gains of the bands, [B, 9, 1, 1], for quantization steps [B]."""
         return self.gains(log_step(step))
 
     def analyse(self, low: Tensor, q: Tensor) -> tuple[Tensor, Tensor]:
-        """The next coarser plane and the bands [B, 9, h, w]."""
+        """Splits planes [B, 3, 2h, 2w] into coarser planes [B, 3, h, w] and bands [B, 9, h, w]."""
         cells = F.pixel_unshuffle(low, 2)
         weights = self.analysis_base + self.analysis_delta
         linear = F.conv2d(F.pixel_unshuffle(reflected(low, 4), 2), weights)
@@ -219,7 +269,10 @@ class Level(nn.Module):
         return out[:, :3], out[:, 3:]
 
     def synthesise(self, low: Tensor, high: Tensor, q: Tensor) -> Tensor:
-        """The next finer plane [B, 3, 2h, 2w] of bands times gains."""
+        """Merges planes [B, 3, h, w] and bands [B, 9, h, w] into finer planes [B, 3, 2h, 2w].
+
+        Bands are latents times gains.
+        """
         delta = eight_bit(self.synthesis_delta) if self.integer else self.synthesis_delta
         linear = F.conv2d(extended(low, high), self.synthesis_base + delta)
         inputs = torch.cat([soft(high_pass(low)), soft(high)], 1)
@@ -227,7 +280,14 @@ class Level(nn.Module):
         return F.pixel_shuffle(linear + change, 2)
 
     def likelihood(self, low: Tensor, parent: Tensor, y: Tensor, q: Tensor) -> Likelihood:
-        """Distributions of latents y, given the plain plane `low` and the coarser level's y."""
+        """Finds the distributions of latents by the context network.
+
+        Args:
+            low: [B, 3, h, w] planes that the plain wavelet makes of coarser levels.
+            parent: [B, 9, h / 2, w / 2] latents of the next coarser level.
+            y: [B, 9, h, w] latents; each depends only on those coded before it.
+            q: [B, 1, 1, 1] result of `log_step`.
+        """
         up = F.interpolate(parent, size=y.shape[2:], mode="nearest")
         inputs = torch.cat([squash(high_pass(low)), torch.log1p(up.abs())], 1)
         z = self._conv(self.first, self._input(inputs), 1)
@@ -265,24 +325,24 @@ class Level(nn.Module):
 
 
 def weight_step(weights: Tensor) -> float:
-    """The power of two, 2 ** -12 .. 2 ** -3, that holds all weights in -127..127 steps."""
+    """Smallest power of two in 2**-12..2**-3 in units of which weights are at most 127."""
     most = max(float(weights.detach().abs().max()), 1e-6)
     return 2.0 ** min(max(math.ceil(math.log2(most / 127)), -12), -3)
 
 
 def eight_bit(weights: Tensor) -> Tensor:
-    """Weights in -127..127 units of the smallest power of two that holds them."""
+    """Rounds weights to integers in -127..127, in units of the smallest power of two that fits."""
     most = max(float(weights.detach().abs().max()), 1e-6)
     return through(weights, 2.0 ** math.ceil(math.log2(most / 127)), -127, 127)
 
 
 def features(y: Tensor) -> Tensor:
-    """The two features of latents that the context sees, [B, 2n, h, w]."""
+    """Features [B, 2n, h, w] of latents [B, n, h, w] for the context network."""
     return torch.cat([squash(y), torch.log1p(y.abs())], 1)
 
 
 def convolve(x: Tensor, w: Tensor, b: Tensor | None, pad: tuple[int, int], fast: bool) -> Tensor:
-    """Convolution, in bfloat16 where `fast`."""
+    """Convolves `x` with weights `w`, biases `b` and zero padding `pad`; in bfloat16 if `fast`."""
     if not fast:
         return F.conv2d(x, w, b, padding=pad)
     half = torch.bfloat16
@@ -290,7 +350,16 @@ def convolve(x: Tensor, w: Tensor, b: Tensor | None, pad: tuple[int, int], fast:
 
 
 class Residual(nn.Module):
-    """Three convolutions, 3 x 3, 1 x 1 and 3 x 3, with the step as a bias; starts as zero."""
+    """Network of three convolutions: 3 x 3, 1 x 1 and 3 x 3. Its initial output is 0.
+
+    Args:
+        inputs: Input channels.
+        hidden: Width of the hidden layers.
+        outputs: Output channels.
+
+    Attributes:
+        by_step: [hidden] slope of the biases of the first layer by `log_step`.
+    """
 
     def __init__(self, inputs: int, hidden: int, outputs: int) -> None:
         super().__init__()
@@ -302,7 +371,17 @@ class Residual(nn.Module):
         nn.init.zeros_(self.third.bias)  # type: ignore[arg-type]  # torch's stubs
 
     def forward(self, x: Tensor, q: Tensor, fast: bool, quantized: bool = False) -> Tensor:
-        """Outputs for inputs [B, C, h, w]; `quantized` simulates 8-bit weights."""
+        """Runs the network.
+
+        Args:
+            x: [B, inputs, h, w] inputs.
+            q: [B, 1, 1, 1] result of `log_step`.
+            fast: Whether convolutions run in bfloat16.
+            quantized: Whether to simulate 8-bit weights.
+
+        Returns:
+            float32 [B, outputs, h, w].
+        """
         first, second, third = (
             eight_bit(layer.weight) if quantized else layer.weight
             for layer in (self.first, self.second, self.third)

@@ -1,4 +1,4 @@
-"""From a picture and planned layers to a `Picture` whose layers are views of shared planes."""
+"""Encoding of planned layers as a `Picture` whose layers are views of shared planes."""
 
 from __future__ import annotations
 
@@ -28,30 +28,42 @@ Report = Callable[[str, int, int], None]
 Box = tuple[int, int, int, int]
 
 TOLERANCE = 0.015
-"""Relative deviation from a target size that is good enough; PSNR in units of 5 dB."""
+"""Deviation from a target that is good enough: of the logarithm of a size, or of PSNR / 5 dB."""
 
 TRIES = 6
+"""Most attempts to meet a target, with little effort and again with full effort."""
+
 FIRST_STEP, LAST_STEP = 0, 640
+"""Range of the index s of the quantization step 2**(s / 64)."""
 
 
 @dataclass
 class Interrupts:
-    """Notes `KeyboardInterrupt`, after which refinement stops and searches end."""
+    """Record of `KeyboardInterrupt`, after which refinement stops and searches end.
+
+    Attributes:
+        seen: Whether there was one.
+    """
 
     seen: bool = False
 
 
 def encode_picture(picture: Floats, plan: Plan, settings: Settings, report: Report) -> Picture:
-    """The 8-bit picture, without metadata, of planned layers.
+    """Encodes planned layers with pyramid textures.
+
+    On `KeyboardInterrupt` during refinement, the picture has the latents that were found so far.
 
     Args:
-        picture: float32 [H, W, 4] with straight alpha, in 0..1.
-        plan: The layers.
-        settings: What is asked for.
-        report: As `Progress`.
+        picture: float32 [H, W, 4] in 0..1 with straight alpha.
+        plan: Plan of the layers.
+        settings: Settings of the encoder.
+        report: Called with the name of a stage, and its numbers of units done and in all.
+
+    Returns:
+        A picture with a depth of 8 bits, without metadata.
 
     Raises:
-        UsageError: A target cannot be reached.
+        UsageError: A target size or PSNR is out of reach.
     """
     height, width = picture.shape[:2]
     shown = visible([coverage_of(v.boundary, width, height).reshape(height, width)
@@ -82,7 +94,7 @@ def _coded(
     rasters: Sequence[Raster], step: int, effort: Effort, settings: Settings, report: Report,
     interrupts: Interrupts,
 ) -> list[Planes]:  # fmt: skip
-    """The planes of all rasters."""
+    """Encodes all rasters at the step of index `step`; records an interrupt in `interrupts`."""
     work = len(rasters) * rasters[0].samples[..., 0].size * (effort.steps + effort.rounds)
     done = 0
 
@@ -105,12 +117,23 @@ def _aimed(
     at: Callable[[int, Effort], Picture], picture: Floats, settings: Settings, effort: Effort,
     interrupts: Interrupts,
 ) -> Picture:  # fmt: skip
-    """The picture at a step that hits the target: found with little effort, then corrected."""
+    """Finds a step at which the picture meets the target: with little effort first, then with full.
+
+    Args:
+        at: Encodes the picture at an index of the step, with some effort.
+        picture: float32 [H, W, 4] in 0..1 with straight alpha.
+        settings: Settings with a target.
+        effort: Full effort.
+        interrupts: Record that ends the search early.
+
+    Raises:
+        UsageError: The target is out of reach.
+    """
     kind, wanted = settings.target or ("", 0.0)
     pixels = picture.shape[0] * picture.shape[1]
 
     def off(image: Picture) -> float:
-        """Logarithm of the ratio to the target; positive if there are too many bits."""
+        """Deviation from the target as for `TOLERANCE`; positive if there are too many bits."""
         if kind == "psnr":
             found = psnr(picture if picture[..., 3].min() < 1 else picture[..., :3], image)
             return (99.0 if found is None else found) / 5 - wanted / 5
@@ -139,7 +162,14 @@ def _aimed(
 
 
 def visible(shares: Sequence[Floats]) -> list[Floats]:
-    """How much of each sample each layer shows, of coverages [H, W] back to front."""
+    """Share of each sample that each layer shows.
+
+    Args:
+        shares: float32 [H, W] coverage by each layer, back to front.
+
+    Returns:
+        For each layer float32 [H, W] in 0..1.
+    """
     clear = np.ones_like(shares[0])
     out: list[Floats] = []
     for covered in reversed(shares):
@@ -151,13 +181,23 @@ def visible(shares: Sequence[Floats]) -> list[Floats]:
 def _view(
     boundaries: Sequence[Boundary | None], number: int, seen: Floats
 ) -> tuple[Box, Occlusion | None]:
-    """Box of a layer of which `seen` [H, W] shows, and what tells its samples of that."""
+    """Box and cuts of a layer.
+
+    Args:
+        boundaries: Boundaries of all layers at rest, back to front.
+        number: Number of the layer.
+        seen: float32 [H, W] share of each sample that it shows.
+
+    Returns:
+        The rectangle x, y, width, height that holds what it shows, and the boundaries that cut it;
+        None if there is only one layer.
+    """
     height, width = seen.shape
     rows, columns = np.flatnonzero(seen.any(1)), np.flatnonzero(seen.any(0))
     if boundaries[number] is None or not len(rows):  # the whole canvas, or wholly hidden
         box = (0, 0, width, height)
     else:
-        # Room for the kernel beyond the rim, so that its samples are filled, not clamped.
+        # A margin for the interpolating kernel, whose samples beyond the rim are then filled.
         x0, y0 = max(int(columns[0]) - 2, 0), max(int(rows[0]) - 2, 0)
         x1, y1 = min(int(columns[-1]) + 3, width), min(int(rows[-1]) + 3, height)
         box = (x0, y0, x1 - x0, y1 - y0)
@@ -178,7 +218,11 @@ def _meets(boundary: Boundary, box: Box) -> bool:
 
 
 def colour_of(picture: Floats) -> Raster:
-    """Straight colours [H, W, 4] as a raster: what is not seen continues what is."""
+    """Makes a raster of the colours of a picture; clear pixels continue the colours of others.
+
+    Args:
+        picture: float32 [H, W, 4] in 0..1 with straight alpha.
+    """
     samples, alpha = picture[..., :3] * np.float32(255), picture[..., 3]
     grey = bool((samples == samples[..., :1]).all())
     if (alpha == 1).all():
@@ -189,12 +233,15 @@ def colour_of(picture: Floats) -> Raster:
 
 
 def alpha_of(alpha: Floats) -> Raster:
-    """Alpha [H, W] as a grey raster."""
+    """Makes a grey raster of alpha, float32 [H, W] in 0..1."""
     return Raster(np.repeat(alpha[..., None] * np.float32(255), 3, 2), None, None, True)
 
 
 def _cells(mask: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
-    """Cells of the support that hold a sample of `mask`."""
+    """Cells of the support, bool [rows, columns], that hold a sample of a mask [H, W].
+
+    None stands for all cells; at least one cell is True.
+    """
     height, width = mask.shape
     rows, columns = cells_of((width, height), CELL)
     side = 1 << CELL

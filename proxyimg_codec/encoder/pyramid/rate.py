@@ -1,4 +1,7 @@
-"""Bits of latents under the tabulated distributions, differentiable."""
+"""Bits of latents under the tabulated distributions, as differentiable functions.
+
+All arrays have the shape of the latents; `log_scale` is the natural logarithm of the scale.
+"""
 
 from __future__ import annotations
 
@@ -10,17 +13,18 @@ import torch
 from torch import Tensor
 
 TAIL_SHARE, TAIL_RATIO = 1 / 8, math.e
-"""Share and relative scale of the second Laplace distribution of the mixture; spec chapter 8."""
+"""Share and relative scale of the second Laplace distribution in the mixture; spec chapter 8."""
 
 _LEAST = 1e-6
 
 
 class _Bits(torch.autograd.Function):
-    """-log2 of the mass of n and of n + 1, for n - mean and log scale."""
+    """Bits, -log2 of the probability, of n and of n + 1, from n - mean and log scale."""
 
     @staticmethod
     def forward(ctx: Any, offset: Tensor, log_scale: Tensor) -> tuple[Tensor, Tensor]:
-        # Mirrored so that n + 1/2 is not below the mean: survival then never cancels.
+        # Mirrored so that n + 1/2 is not below the mean. Differences of survival functions then
+        # lose no digits.
         flip = offset < -0.5
         centre = torch.where(flip, -1 - offset, offset)
         rate = torch.exp(-log_scale)
@@ -35,7 +39,8 @@ class _Bits(torch.autograd.Function):
             )
         first = (survivals[0] - survivals[1]).clamp_min(_LEAST)
         second = (survivals[1] - survivals[2]).clamp_min(_LEAST)
-        # By the offset z, the survival falls by the density; by the log scale it gains z times it.
+        # The derivative of a survival function by z is minus the density; by the log scale it is z
+        # times the density.
         moments = [d * (centre + s) for d, s in zip(densities, (-0.5, 0.5, 1.5), strict=True)]
         k = 1 / math.log(2)
         grads = [
@@ -58,21 +63,21 @@ class _Bits(torch.autograd.Function):
 
 
 def _tails(distance: Tensor, rate: Tensor) -> tuple[Tensor, Tensor]:
-    """Halves of the survival functions of both parts of the mixture."""
+    """Survival functions of both parts of the mixture at a distance >= 0 from the mean."""
     near = torch.exp(-distance * rate) * ((1 - TAIL_SHARE) / 2)
     far = torch.exp(distance * rate * (-1 / TAIL_RATIO)) * (TAIL_SHARE / 2)
     return near, far
 
 
 def bits(values: Tensor, mean: Tensor, log_scale: Tensor) -> Tensor:
-    """Bits of latents; between integers, the line that joins the bits of both neighbours."""
+    """Bits of latents; those between integers are interpolated linearly."""
     low = torch.floor(values.detach())
     pair: tuple[Tensor, Tensor] = _Bits.apply(low - mean, log_scale)  # type: ignore[no-untyped-call]  # torch's stubs
     return pair[0] + (values - low) * (pair[1] - pair[0])
 
 
 class _Smooth(torch.autograd.Function):
-    """Bits of integers, whose gradient by the value is that of the density."""
+    """Bits of integers, with the gradient that they have as a smooth function of n - mean."""
 
     @staticmethod
     def forward(ctx: Any, offset: Tensor, log_scale: Tensor) -> Tensor:
@@ -91,14 +96,14 @@ class _Smooth(torch.autograd.Function):
 
 
 def bits_of_integers(values: Tensor, mean: Tensor, log_scale: Tensor) -> Tensor:
-    """Bits of integer latents; the gradient by `values` is that of the smooth density."""
+    """Bits of integer latents, with the gradient that they have as a smooth function of them."""
     found: Tensor = _Smooth.apply(values - mean, log_scale)  # type: ignore[no-untyped-call]  # torch's stubs
     return found
 
 
 @torch.no_grad()
 def bits_at(offset: Tensor, log_scale: Tensor) -> Tensor:
-    """Bits of integers that lie `offset` from their mean; no gradient."""
+    """Bits of integers whose differences from their means are `offset`; without gradient."""
     distance, rate = offset.abs(), torch.exp(-log_scale)
     inner, outer = (sum(_tails((distance + by).abs(), rate)) for by in (-0.5, 0.5))
     inner = torch.where(distance < 0.5, 1 - inner, inner)
@@ -106,10 +111,12 @@ def bits_at(offset: Tensor, log_scale: Tensor) -> Tensor:
 
 
 class Around(NamedTuple):
-    """Bits of integers and of their neighbours.
+    """Bits of integers n and of their neighbours.
 
     Attributes:
-        here, below, above: Bits of n, n - 1 and n + 1.
+        here: Bits of n.
+        below: Bits of n - 1.
+        above: Bits of n + 1.
         slope: Derivative of the bits of n by n.
     """
 
@@ -121,7 +128,7 @@ class Around(NamedTuple):
 
 @torch.no_grad()
 def around(values: Tensor, mean: Tensor, log_scale: Tensor) -> Around:
-    """Bits around integer latents."""
+    """Bits of integer latents and of their neighbours; without gradient."""
     offset = values - mean
     rate = torch.exp(-log_scale)
     distance = offset.abs()

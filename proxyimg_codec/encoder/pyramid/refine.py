@@ -1,4 +1,4 @@
-"""Rate-distortion refinement of latents: stochastic rounding, then a greedy one."""
+"""Rate-distortion refinement of latents: by stochastic rounding, then by greedy moves."""
 
 from __future__ import annotations
 
@@ -14,32 +14,34 @@ from .rate import around, bits, bits_of_integers
 from .similarity import ms_ssim
 
 RATE_WEIGHT = 0.15
-"""Squared error, in units of the quantization step squared, that a bit is worth.
+"""Squared error, in squares of the quantization step, that a bit is worth.
 
-High-rate theory gives 2 ln 2 / 12 = 0.116 for uniform quantization; as latents are chosen with
-their cost in mind, a finer step with dearer bits is better.
+High-rate theory gives 2 ln 2 / 12 = 0.116 for uniform quantization. Here latents are chosen by
+their cost, so a finer step with dearer bits is better.
 """
 
 DEAD_ZONE = 0.2
-"""How far the analysis' latents are drawn to zero before refinement."""
+"""Distance by which latents of the analysis are moved towards zero before refinement."""
 
 RATE, BETAS = 0.08, (0.8, 0.95)
-"""Adam's rate and averages for latents: large and short, as there are few steps."""
+"""Learning rate and averages of Adam for latents: large and short, because there are few steps."""
 
 
 class Target(NamedTuple):
-    """What latents should show.
+    """Target of refinement: pictures that latents should show, and restrictions on the latents.
 
     Attributes:
-        picture: [1, 3, H, W] in 0..255, H and W multiples of 2**levels.
-        weight: [1, 1, H, W] of the squared error of each sample, or None for 1.
-        support: For each level a mask [1, 1, h, w] of its latents, or None for all.
-        free: For each level, then the lowest plane, a mask of the latents that may change, or
-            None for all.
-        step: Quantization step, [1].
-        shifts: Shift of the scale index per level: luma, chroma; None = 0.
-        similarity: What 1 - MS-SSIM counts, in steps squared, instead of the squared error; None =
-            the squared error it is.
+        picture: [B, 3, H, W] pictures in 0..255; H and W are multiples of 2**levels.
+        weight: [B, 1, H, W] weights of the squared errors of samples; None = 1.
+        support: For each level a float mask [1, 9, h, w], 0 for latents that must be 0, else 1;
+            None = all 1.
+        free: For each level, then for the lowest planes, a bool mask of the latents that may
+            change; None = all.
+        step: [B] quantization steps.
+        shifts: Shifts of the scale index for luma and chroma of level 1, then of level 2, and so
+            on; None = 0.
+        similarity: Weight of 1 - MS-SSIM, in squares of the step, as the error; None to use the
+            squared error instead.
     """
 
     picture: Tensor
@@ -52,31 +54,39 @@ class Target(NamedTuple):
 
 
 MOVING = 0.35
-"""Share of the latents that would gain by a move, that make it in a round."""
+"""Share of the latents that gain by a move, which make it in a round."""
 
 
 def annealed(share: float) -> float:
-    """Factor of the rate when `share` of the steps is done."""
+    """Factor of the learning rate when a share 0..1 of the steps is done."""
     return 0.475 * (1 + math.cos(math.pi * share)) + 0.05
 
 
 def temperature(share: float) -> float:
-    """Temperature of the rounding when `share` of the steps is done."""
+    """Temperature of stochastic rounding when a share 0..1 of the steps is done."""
     return float(0.5 * 0.3**share)
 
 
 def shrunk(latents: Sequence[Tensor], by: float) -> list[Tensor]:
-    """Latents drawn to zero by at most `by`; the lowest plane stays."""
+    """Moves latents towards zero by at most `by`; the lowest planes, which are last, stay."""
     return [y - y.clamp(-by, by) for y in latents[:-1]] + [latents[-1]]
 
 
 def relaxed(latents: Sequence[Tensor], temperature: float) -> list[Tensor]:
-    """Latents rounded stochastically: Gumbel annealing (Yang, Bamler, Mandt 2020, section 3)."""
+    """Rounds latents stochastically, by Gumbel annealing (Yang, Bamler, Mandt 2020, section 3).
+
+    Args:
+        latents: Latents.
+        temperature: Temperature; near 0, results are near integers.
+
+    Returns:
+        Latents between the integers beside them, differentiable.
+    """
     chosen = []
     for y in latents:
         low = torch.floor(y.detach())
         share = (y - low).clamp(1e-4, 1 - 1e-4)
-        # atanh(r) - atanh(1 - r) = log(r (1 + r) ... ) / 2, in one logarithm
+        # atanh(r) - atanh(1 - r) with a single logarithm
         logit = 0.5 * torch.log(share * (1 + share) / ((1 - share) * (2 - share)))
         noise = torch.rand_like(y).clamp(1e-6, 1 - 1e-6)
         gumbel = torch.log(noise / (1 - noise))
@@ -85,12 +95,12 @@ def relaxed(latents: Sequence[Tensor], temperature: float) -> list[Tensor]:
 
 
 class Cost(NamedTuple):
-    """What latents cost.
+    """Cost of the latents of B pictures.
 
     Attributes:
-        error: Squared error in steps squared, [B].
-        spent: Bits, [B].
-        likely: The distributions of levels 1...
+        error: [B] squared errors in squares of the step.
+        spent: [B] bits, without those of the lowest planes.
+        likely: Distributions of the latents of levels 1, 2, ...
     """
 
     error: Tensor
@@ -99,12 +109,19 @@ class Cost(NamedTuple):
 
     @property
     def total(self) -> Tensor:
-        """Error plus `RATE_WEIGHT` a bit, of all pictures."""
+        """Error plus `RATE_WEIGHT` times bits, summed over the pictures."""
         return (self.error + RATE_WEIGHT * self.spent).sum()
 
 
 def cost(model: Model, target: Target, latents: Sequence[Tensor], smooth: bool = True) -> Cost:
-    """Costs of latents; `smooth` if they lie between integers."""
+    """Computes the cost of latents.
+
+    Args:
+        model: The model.
+        target: Target of the latents.
+        latents: Latents of levels 1, 2, ..., then the lowest planes.
+        smooth: Whether latents may lie between integers.
+    """
     count = bits if smooth else bits_of_integers
     likely = model.likelihoods(list(latents), target.step, target.shifts)
     masks: Sequence[Tensor | None] = target.support or [None] * len(likely)
@@ -125,7 +142,7 @@ def cost(model: Model, target: Target, latents: Sequence[Tensor], smooth: bool =
 
 @torch.no_grad()
 def structural(model: Model, target: Target, latents: Sequence[Tensor]) -> Target:
-    """The target with MS-SSIM as its aim, which counts as much as the error of `latents` now."""
+    """Makes a target that aims at MS-SSIM, with a weight by which the error of `latents` stays."""
     error = cost(model, target, latents, smooth=False).error
     alike = cost(model, target._replace(similarity=1.0), latents, smooth=False).error
     return target._replace(similarity=float(error / alike.clamp_min(1e-6)))
@@ -134,14 +151,17 @@ def structural(model: Model, target: Target, latents: Sequence[Tensor]) -> Targe
 def refined(
     model: Model, target: Target, start: Sequence[Tensor], steps: int, tick: Callable[[], None]
 ) -> list[Tensor]:
-    """Latents after `steps` of stochastic refinement, not yet rounded.
+    """Refines latents by gradient descent with stochastic rounding.
 
     Args:
         model: The model.
-        target: What they should show.
-        start: Latents of levels 1.., and the lowest plane.
+        target: Target of the latents.
+        start: Latents of levels 1, 2, ..., then the lowest planes.
         steps: Number of steps.
-        tick: Called after each; `KeyboardInterrupt` from it, or in it, passes through.
+        tick: Called after each step; `KeyboardInterrupt`, from there or elsewhere, passes through.
+
+    Returns:
+        Latents that are not rounded yet.
     """
     fixed = [y.detach() for y in start]
     latents = [y.clone().contiguous(memory_format=torch.channels_last) for y in fixed]
@@ -160,7 +180,7 @@ def refined(
 
 
 def held(latents: Sequence[Tensor], fixed: Sequence[Tensor], target: Target) -> list[Tensor]:
-    """Latents where they are free and supported, elsewhere as fixed or 0."""
+    """Replaces latents that may not change by those in `fixed`, and those without support by 0."""
     out = list(latents)
     if target.free is not None:
         out = [torch.where(m, y, f) for y, f, m in zip(out, fixed, target.free, strict=True)]
@@ -173,10 +193,18 @@ def improved(
     model: Model, target: Target, latents: Sequence[Tensor], rounds: int, seed: int,
     tick: Callable[[], None],
 ) -> list[Tensor]:  # fmt: skip
-    """Integer latents, each moved by one where that lowers the cost, again and again.
+    """Rounds latents, and moves them by one where that lowers the cost, round after round.
+
+    Args:
+        model: The model.
+        target: Target of the latents.
+        latents: Latents of levels 1, 2, ..., then the lowest planes.
+        rounds: Number of rounds.
+        seed: Seed of the choice of moves.
+        tick: Called after each round.
 
     Returns:
-        The best of all rounds.
+        Integer latents: the best of all rounds.
     """
     random = torch.Generator().manual_seed(seed)
     now = held([torch.round(y) for y in latents], [torch.round(y) for y in latents], target)
@@ -202,11 +230,19 @@ def moved(
     model: Model, step: Tensor, latents: Sequence[Tensor], likely: Sequence[Likelihood],
     slopes: Sequence[Tensor], random: torch.Generator,
 ) -> list[Tensor]:  # fmt: skip
-    """Integer latents after one round of moves by one.
+    """Makes one round of moves of integer latents by one.
 
-    The change of a latent's own bits is exact; distortion and the bits of others follow the
-    slopes of the cost, and the curvature of the former. As neighbours that move together may
-    overshoot, only a random part of what would gain moves.
+    The change of a latent's own bits is exact. That of the error and of the bits of others is
+    estimated from the slope of the cost and the curvature of the error. Neighbours that move
+    together may overshoot, so only a random part of the latents that would gain moves.
+
+    Args:
+        model: The model.
+        step: [B] quantization steps.
+        latents: Integer latents of levels 1, 2, ..., then the lowest planes, which do not move.
+        likely: Distributions of the latents.
+        slopes: Derivatives of the total cost by the latents.
+        random: Generator that chooses the latents that move.
     """
     out = list(latents)
     for k, p in enumerate(likely):

@@ -1,4 +1,4 @@
-"""Shifts of the scale index: what the context predicts, corrected for one picture."""
+"""Shifts of the scale index, which correct the predictions of the context network for a picture."""
 
 from __future__ import annotations
 
@@ -14,20 +14,26 @@ SHIFTS = range(-8, 8)
 
 
 class Sample(NamedTuple):
-    """Some latents less their mean, the log of their scale, and which of them are coded."""
+    """Sample of the latents of a level.
+
+    Attributes:
+        offset: Latents less their means.
+        log_scale: Natural logarithms of their scales, of the same shape.
+        mask: 1 for latents that are coded, 0 for others; broadcasts with them.
+    """
 
     offset: Tensor
     log_scale: Tensor
     mask: Tensor
 
     def bits(self, shift: int) -> float:
-        """Bits with a shift of the scale index."""
+        """Bits of the sample with a shift of the scale index."""
         scale = (self.log_scale + shift / 8).clamp(*LOG_SCALES)
         return float((bits_at(self.offset, scale) * self.mask).sum())
 
 
 def best_shift(samples: list[Sample]) -> int:
-    """The shift that takes the fewest bits, found downhill from none."""
+    """Shift that takes the fewest bits, found by descent from 0."""
     spent: dict[int, float] = {}
 
     def cost(shift: int) -> float:

@@ -1,4 +1,4 @@
-"""MS-SSIM in torch, as what refinement may aim at."""
+"""MS-SSIM in torch, as an aim of refinement."""
 
 from __future__ import annotations
 
@@ -10,13 +10,23 @@ WEIGHTS = (0.0448, 0.2856, 0.3001, 0.2363, 0.1333)
 """Exponents of the scales (Wang, Simoncelli, Bovik 2003, section 3.2)."""
 
 C1, C2 = (0.01 * 255) ** 2, (0.03 * 255) ** 2
+"""Constants that keep quotients stable, for samples in 0..255."""
+
 WINDOW, SIGMA = 11, 1.5
+"""Side and standard deviation of the Gaussian window in samples."""
 
 
 def ms_ssim(a: Tensor, b: Tensor) -> Tensor:
-    """Multi-scale structural similarity [B] of pictures [B, C, H, W] in 0..255.
+    """Multi-scale structural similarity of pictures.
 
-    Pictures too small for all scales are judged by the first ones, with exponents that sum to 1.
+    Pictures that are too small for all scales use the first ones, with exponents that sum to 1.
+
+    Args:
+        a: float32 [B, C, H, W] pictures in 0..255, of at least `WINDOW` samples a side.
+        b: float32 [B, C, H, W] pictures to compare them with.
+
+    Returns:
+        float32 [B], 1 for equal pictures.
     """
     x = torch.arange(WINDOW, dtype=a.dtype) - WINDOW // 2
     window = torch.exp(-(x**2) / (2 * SIGMA**2))
@@ -38,7 +48,7 @@ def ms_ssim(a: Tensor, b: Tensor) -> Tensor:
 
 
 def _blur(x: Tensor, window: Tensor) -> Tensor:
-    """Gaussian mean of each channel, where the window fits."""
+    """Gaussian mean of each channel at all places where the window fits into the picture."""
     channels = x.shape[1]
     across = window.view(1, 1, 1, -1).expand(channels, 1, 1, -1)
     down = window.view(1, 1, -1, 1).expand(channels, 1, -1, 1)

@@ -1,4 +1,4 @@
-"""The CDF 9/7 wavelet as convolutions over 2 x 2 cells, where the learned transform starts."""
+"""CDF 9/7 wavelet as convolutions over 2 x 2 cells, from which the learned transform starts."""
 
 from __future__ import annotations
 
@@ -15,12 +15,19 @@ _HIGH = (0.788485616406, -0.418092273222, -0.040689417609, 0.064538882629)
 
 
 def synthesis_weights() -> Tensor:
-    """Float32 [12 cells, 12 bands, 5, 5]: the decoder's."""
+    """Synthesis weights of the decoder, float32 [12, 12, 5, 5].
+
+    Outputs are the 4 samples of a cell of each colour; inputs are 3 planes and 9 bands.
+    """
     return torch.tensor(wavelet(), dtype=torch.float32)
 
 
 def analysis_weights() -> Tensor:
-    """Float32 [12 outputs: 3 low, 9 latents (colour, band); 12 cells, 5, 5]."""
+    """Analysis weights, float32 [12, 12, 5, 5].
+
+    Outputs are 3 planes and 9 bands 3 * colour + band; inputs are the 4 samples of a cell of each
+    colour.
+    """
     axis = np.zeros((2, 2, 5))  # [band, phase, tap]
     for phase in range(2):
         for tap in range(5):
@@ -38,7 +45,7 @@ def analysis_weights() -> Tensor:
 
 
 def reflected(x: Tensor, reach: int) -> Tensor:
-    """Planes with `reach` more samples on each side, mirrored as often as needed."""
+    """Extends planes [B, C, h, w] by `reach` samples on each side, mirrored as often as needed."""
     for dim in (2, 3):
         n = x.shape[dim]
         period = max(2 * n - 2, 1)
@@ -48,12 +55,26 @@ def reflected(x: Tensor, reach: int) -> Tensor:
 
 
 def _extend(x: Tensor, dim: int, high: int) -> Tensor:
-    """Two samples of symmetric extension at each end, as the decoder's."""
+    """Extends a dimension by two samples at each end, symmetrically, as the decoder does.
+
+    Args:
+        x: Tensor to extend.
+        dim: The dimension.
+        high: Whether it is that of a high-pass band, which has another symmetry.
+    """
     return x.index_select(dim, torch.from_numpy(mirrored_indices(x.shape[dim], bool(high))))
 
 
 def extended(low: Tensor, high: Tensor) -> Tensor:
-    """Planes [B, 3 + 9, h + 4, w + 4], each band by its own symmetry."""
+    """Joins planes and bands, extended by two samples on each side, each by its own symmetry.
+
+    Args:
+        low: [B, 3, h, w] planes.
+        high: [B, 9, h, w] bands.
+
+    Returns:
+        [B, 12, h + 4, w + 4]: planes, then the bands ordered by band, then colour.
+    """
     parts = [_extend(_extend(low, 3, 0), 2, 0)]
     for band, (v, h) in enumerate(BANDS):
         parts.append(_extend(_extend(high[:, band::3], 3, h), 2, v))

@@ -1,4 +1,4 @@
-"""Windows on a raster and its latents: what is refined at a time."""
+"""Windows on a raster and its latents, which are refined one after the other."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from torch import Tensor
 
 
 class Window(NamedTuple):
-    """A window: slices of rows and columns of the raster, in samples.
+    """Window on a raster.
 
     Attributes:
-        inner: What it is responsible for.
-        outer: What it sees.
-        partial: Whether there are other windows.
+        inner: Rows and columns, in samples, whose latents are decided in this window.
+        outer: Rows and columns that it sees: the inner ones and a margin.
+        partial: Whether the raster has other windows.
     """
 
     inner: tuple[slice, slice]
@@ -23,7 +23,14 @@ class Window(NamedTuple):
 
     @classmethod
     def of(cls, corner: tuple[int, int], side: int, margin: int, shape: tuple[int, int]) -> Window:
-        """The window at a corner, of a raster of `shape`."""
+        """Makes a window.
+
+        Args:
+            corner: First row and column of its inner part.
+            side: Most rows and columns of its inner part.
+            margin: Most rows and columns that it sees beyond that.
+            shape: Rows and columns of the raster.
+        """
         inner = [slice(c, min(c + side, n)) for c, n in zip(corner, shape, strict=True)]
         outer = [
             slice(max(s.start - margin, 0), min(s.stop + margin, n))
@@ -34,19 +41,19 @@ class Window(NamedTuple):
 
     @property
     def samples(self) -> int:
-        """Samples it is responsible for."""
+        """Number of samples of the inner part."""
         rows, columns = self.inner
         return int((rows.stop - rows.start) * (columns.stop - columns.start))
 
     def at(self, level: int, inner: bool = False) -> tuple[slice, slice]:
-        """The window among the latents of a level."""
+        """Rows and columns of latents of a level that the window sees, or only those `inner`."""
         rows, columns = (
             slice(s.start >> level, s.stop >> level) for s in (self.inner if inner else self.outer)
         )
         return rows, columns
 
     def inside(self, level: int) -> tuple[slice, slice]:
-        """The inner window within the outer one, among latents of a level."""
+        """Rows and columns of the inner part, among the latents of a level that the window sees."""
         rows, columns = (
             slice((i.start - o.start) >> level, (i.stop - o.start) >> level)
             for i, o in zip(self.inner, self.outer, strict=True)
@@ -54,9 +61,12 @@ class Window(NamedTuple):
         return rows, columns
 
     def mask(self, level: int) -> Tensor:
-        """[1, 1, h, w] of a level: what may change, which is what is not settled before it.
+        """Mask of the latents of a level that may change: those that no earlier window decided.
 
-        Settled are windows above, and those to the left in the same rows.
+        Windows above, and windows to the left in the same rows, are earlier.
+
+        Returns:
+            bool [1, 1, h, w] of the latents that the window sees.
         """
         rows, columns = self.at(level)
         i, j = self.inside(level)

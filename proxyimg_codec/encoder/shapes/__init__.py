@@ -1,1 +1,1 @@
-"""From a picture to named layers: regions, contours, Bézier paths, meshes."""
+"""Decomposition of a picture into named layers: regions, contours, Bézier paths, meshes."""

@@ -1,6 +1,7 @@
-"""The paper's way to fit a boundary: gradient descent on the Chamfer distance, splitting segments.
+"""Fit of boundaries as in the paper: gradient descent on the Chamfer distance, with splits.
 
-Slower and less exact than `contours.fit_paths`; kept for comparison with ProxyImg's own figures.
+It is slower and less exact than `contours.fit_paths`, and is kept for comparison with the figures
+of ProxyImg.
 """
 
 from typing import TYPE_CHECKING
@@ -13,8 +14,8 @@ from proxyimg_codec.encoder.shapes.paths import Bools, Floats, Ints, faults
 if TYPE_CHECKING:
     import torch
 
-_SAMPLES = 20  # points a segment in the distance
-_RATE = 2e-3  # Adam's step, in long sides of the canvas
+_SAMPLES = 20  # points of each segment that the distance is computed from
+_RATE = 2e-3  # learning rate of Adam, in long sides of the canvas
 
 
 def fit_paths_chamfer(
@@ -26,30 +27,31 @@ def fit_paths_chamfer(
     tau: float = 2e-3,
     min_area: float = 4.0,
 ) -> list[Ints]:
-    """Fit closed cubic paths by the adaptive Chamfer method of ProxyImg.
+    """Fits closed cubic paths by the adaptive Chamfer method of ProxyImg; deterministic.
 
-    Every loop starts with `segments` cubics whose 3m control points are taken from the contour at
-    equal intervals. Adam minimises the two-way Chamfer distance (sum of squared distances from
-    each curve point to the nearest contour point and back). Between rounds of `split_every`
-    iterations, each segment that lies farther than `tau` from its part of the contour on average
-    is split in two by de Casteljau's construction. Coordinates are divided by the long side of the
-    canvas, so `tau` is in long sides. Where the result crosses itself or another loop, the loops
-    concerned are taken from `fit_paths` instead. Deterministic.
+    Every loop starts with `segments` cubics, whose control points are taken from the contour at
+    equal intervals. Adam minimises the two-way Chamfer distance: the sum of squared distances from
+    each curve point to the nearest contour point, and back. After every `split_every` iterations,
+    segments whose mean distance from their part of the contour exceeds `tau` are halved by de
+    Casteljau's construction. A loop that crosses itself or another one is taken from `fit_paths`
+    instead.
 
     Args:
-        mask: bool [H, W].
-        step: quantization step in px; 0.5 must be a multiple of it.
-        segments: cubics a loop starts with, >= 2; tiny loops get as many as their samples allow.
-        iterations: gradient steps in all, >= 1.
-        split_every: gradient steps between splits, >= 1.
-        tau: mean distance above which a segment is split, in long sides of the canvas.
-        min_area: as for `fit_paths`.
+        mask: bool [H, W], True inside.
+        step: Quantization step in px; 0.5 must be a multiple of it.
+        segments: Segments that a loop starts with, at least 2; tiny loops get as many as their
+            samples allow.
+        iterations: Number of gradient steps, at least 1.
+        split_every: Gradient steps between splits, at least 1.
+        tau: Mean distance above which a segment is split, in long sides of the canvas.
+        min_area: Loops of a smaller area, in px², are dropped, but never all of them.
 
     Returns:
-        As `fit_paths`: one int64 [3m, 2] a loop, in units of `step`, free of `faults`.
+        For each loop of `trace` a path int64 [3m, 2] in units of `step`, without `faults`, as
+        `fit_paths` returns them.
 
     Raises:
-        ValueError: if `step` does not divide 0.5 or a count is out of range.
+        ValueError: `step` does not divide 0.5, or a count is out of range.
     """
     if segments < 2 or iterations < 1 or split_every < 1:
         raise ValueError(f"bad counts {segments}, {iterations}, {split_every}")
@@ -62,7 +64,7 @@ def fit_paths_chamfer(
     for loop in np.split(outline.points, np.flatnonzero(np.diff(outline.base)) + 1):
         control = _descend(loop / side, segments, iterations, split_every, tau) * side
         paths.append(np.rint(np.clip(control, 0, outline.extent) / step).astype(np.int64))
-    # Ends after at most one round a loop, for `safe` as a whole has no faults.
+    # This ends after at most one round per loop, because `safe` as a whole has no faults.
     while any(bad := [f.any() for f in faults(paths, outline.positive)]):
         paths = [s if b else p for p, s, b in zip(paths, safe, bad, strict=True)]
     return paths
@@ -71,10 +73,21 @@ def fit_paths_chamfer(
 def _descend(
     contour: Floats, segments: int, iterations: int, split_every: int, tau: float
 ) -> Floats:
-    """Fit one closed path to contour points [n, 2], all in long sides; returns [3m, 2]."""
+    """Fits one closed path to a contour.
+
+    Args:
+        contour: float64 [n, 2] points of the contour in long sides of the canvas.
+        segments: As for `fit_paths_chamfer`.
+        iterations: As for `fit_paths_chamfer`.
+        split_every: As for `fit_paths_chamfer`.
+        tau: As for `fit_paths_chamfer`.
+
+    Returns:
+        float64 [3m, 2] control points in long sides of the canvas.
+    """
     import torch
 
-    torch.set_num_threads(1)  # for so little work threads that wait for each other cost most
+    torch.set_num_threads(1)  # with so little work, threads mostly wait for each other
     target = torch.from_numpy(contour).float()
     count = 3 * min(segments, max(2, len(contour) // 3))
     control = target[torch.arange(count) * len(target) // count]
@@ -99,7 +112,15 @@ def _descend(
 
 
 def _error(curve: "torch.Tensor", target: "torch.Tensor") -> "torch.Tensor":
-    """Mean distance, float32 [m], of a segment's points and of the contour points nearest it."""
+    """Mean distance of each segment from the part of the contour that is nearest to it.
+
+    Args:
+        curve: float32 [m, _SAMPLES, 2] points of m segments.
+        target: float32 [n, 2] points of the contour.
+
+    Returns:
+        float32 [m] mean over the points of a segment, and the contour points nearest to them.
+    """
     import torch
 
     apart = torch.cdist(curve.reshape(-1, 2), target)
@@ -109,7 +130,7 @@ def _error(curve: "torch.Tensor", target: "torch.Tensor") -> "torch.Tensor":
 
 
 def _quads(control: "torch.Tensor") -> "torch.Tensor":
-    """The segments [m, 4, 2] of a closed path [3m, 2]."""
+    """Segments [m, 4, 2] of a closed path [3m, 2]."""
     import torch
 
     parts = control.reshape(-1, 3, 2)
@@ -117,7 +138,7 @@ def _quads(control: "torch.Tensor") -> "torch.Tensor":
 
 
 def _split(control: "torch.Tensor", which: "torch.Tensor") -> "torch.Tensor":
-    """Halve some segments of a closed path by de Casteljau's construction; which: bool [m]."""
+    """Halves the segments `which`, bool [m], of a closed path by de Casteljau's construction."""
     import torch
 
     p, a, b, q = _quads(control).unbind(1)

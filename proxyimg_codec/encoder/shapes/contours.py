@@ -1,4 +1,4 @@
-"""From a mask to its boundary: crack tracing and cubic paths fitted to the cracks."""
+"""Boundary of a mask: loops along the edges of its pixels, and cubic paths fitted to them."""
 
 from typing import Any
 
@@ -17,21 +17,21 @@ from proxyimg_codec.encoder.shapes.paths import (
 )
 
 _STEP = np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])  # right, down, left, up
-_SMOOTH = -0.8  # cosine between the two sides of a joint, below which it is no corner
-_SLACK = 0.15  # px that quantization may add to the tolerance before a piece is split
+_SMOOTH = -0.8  # cosine of the angle between the two sides of a joint, below which it is no corner
+_SLACK = 0.15  # px by which a quantized piece may exceed the tolerance before it is split
 
 
 def trace(mask: Bools, min_area: float = 4.0) -> list[Floats]:
-    """Trace the borders of a mask along the cracks between pixels.
+    """Traces the borders of a mask along the edges between pixels.
 
     Pixels that touch only at a corner are not connected: loops may meet there, but never cross.
 
     Args:
-        mask: bool [H, W].
-        min_area: loops that enclose fewer pixels are dropped, in px².
+        mask: bool [H, W], True inside.
+        min_area: Loops that enclose a smaller area, in px², are dropped.
 
     Returns:
-        The corners of each loop, float64 [n, 2] as (x, y) with integer values, in an order that
+        For each loop its corners, float64 [n, 2] as (x, y) with integer values, in an order that
         makes the shoelace area positive for outer contours and negative for holes.
     """
     solid = np.pad(mask, 1)
@@ -39,14 +39,14 @@ def trace(mask: Bools, min_area: float = 4.0) -> list[Floats]:
     keys = []
     for side, (shift, axis) in enumerate(((1, 0), (-1, 1), (-1, 0), (1, 1))):
         y, x = np.nonzero(solid & ~np.roll(solid, shift, axis))
-        # The edge starts at the pixel's corner that comes first when going round it rightwards.
+        # Edges run clockwise round their pixel; an edge is known by the corner that it starts from.
         tails = (y + (side in (2, 3))) * width + x + (side in (1, 2))
         keys.append(tails * 4 + side)
     key = np.sort(np.concatenate(keys))
     tail, way = np.divmod(key, 4)
     head = tail + _STEP[way] @ [1, width]
     following = np.zeros(len(key), np.int64)
-    for turn in (3, 0, 1):  # the right turn is written last and so wins
+    for turn in (3, 0, 1):  # a right turn is written last, so that it wins
         wanted = head * 4 + (way + turn) % 4
         at = np.minimum(np.searchsorted(key, wanted), len(key) - 1)
         following = np.where(key[at] == wanted, at, following)
@@ -56,7 +56,7 @@ def trace(mask: Bools, min_area: float = 4.0) -> list[Floats]:
 
 
 def _cycles(following: Ints, keep: Bools) -> list[list[int]]:
-    """Split a permutation into its cycles, listing only the members to keep."""
+    """Splits a permutation into its cycles, listing only the members to keep."""
     ahead, kept, cycles = following.tolist(), keep.tolist(), []
     seen = [False] * len(ahead)
     for start in range(len(ahead)):
@@ -74,22 +74,22 @@ def _cycles(following: Ints, keep: Bools) -> list[list[int]]:
 def fit_paths(
     mask: Bools, tolerance: float = 0.6, step: float = 0.25, min_area: float = 4.0
 ) -> list[Ints]:
-    """Fit closed cubic paths to the border of a mask.
+    """Fits closed cubic paths to the border of a mask, by least squares.
 
     Args:
-        mask: bool [H, W].
-        tolerance: largest distance from the midpoints of the crack edges to the curve before
-            quantization, in px, > 0.
-        step: quantization step in px; 0.5 must be a multiple of it.
-        min_area: loops smaller than this, in px², are dropped, but never all of them.
+        mask: bool [H, W], True inside.
+        tolerance: Largest distance in px from the midpoints of pixel edges to the curve, before it
+            is quantized; positive.
+        step: Quantization step in px; 0.5 must be a multiple of it.
+        min_area: Loops of a smaller area, in px², are dropped, but never all of them.
 
     Returns:
-        One path for each loop of `trace`, in the same order: int64 [3m, 2] in units of `step`,
-        P0, C1, C2, P1, C3, ... of m >= 2 segments, without `faults`. All points lie on the canvas;
-        straight borders between corners are exact. An empty mask gives an empty list.
+        For each loop of `trace`, in the same order, a path int64 [3m, 2] in units of `step`: P0,
+        C1, C2, P1, C3, ... of m >= 2 segments, without `faults`. All points lie on the canvas.
+        Straight borders between corners are exact. An empty mask gives an empty list.
 
     Raises:
-        ValueError: if `step` does not divide 0.5 or `tolerance` is not positive.
+        ValueError: `step` does not divide 0.5, or `tolerance` is not positive.
     """
     if not (step > 0 and (0.5 / step).is_integer()) or not tolerance > 0:
         raise ValueError(f"bad step {step} or tolerance {tolerance}")
@@ -105,10 +105,10 @@ def outline_of(mask: Bools, min_area: float) -> Outline | None:
 
 
 def _reach(outline: Outline, tolerance: float) -> Ints:
-    """How many samples one cubic that starts at each sample can span, int64 [n].
+    """Number of samples that one cubic from each sample can span within the tolerance, int64 [n].
 
-    The end of the longest piece hardly ever moves back when its start moves on, so the ends found
-    for some starts bound those in between.
+    It is searched for every 16th start first, then for those in between. The end of the longest
+    piece hardly ever moves back when its start moves on, so the ends that are known bound others.
     """
     limit = np.minimum(outline.until(outline.corner), (outline.size + 1) // 2)
     index = np.arange(len(limit))
@@ -131,7 +131,7 @@ def _reach(outline: Outline, tolerance: float) -> Ints:
 
 
 def _segment(outline: Outline, tolerance: float) -> Bools:
-    """Choose the joints, bool [n]: as few as the reach of the pieces allows."""
+    """Chooses the samples at which pieces join, bool [n]: as few as their reach allows."""
     reach = _reach(outline, tolerance)
     joint = outline.corner.copy()
     for start in np.unique(outline.base):
@@ -141,7 +141,7 @@ def _segment(outline: Outline, tolerance: float) -> Bools:
             here, gone = np.arange(start, start + size), np.zeros(size, np.int64)
             while (gone < size).all():
                 gone += reach[outline.at(here, gone)]
-            ends = here[[np.argmax(gone)]]  # fewest pieces round the loop, with the most slack
+            ends = here[[np.argmax(gone)]]  # the start with the fewest pieces and the most slack
             joint[ends] = True
         for end, length in zip(ends, np.diff(ends, append=ends[0] + size), strict=True):
             if reach[end] < length:
@@ -151,7 +151,14 @@ def _segment(outline: Outline, tolerance: float) -> Bools:
 
 
 def _cuts(reach: Ints) -> list[int]:
-    """Cut an open chain into as few pieces as possible, of about equal slack."""
+    """Cuts an open chain into as few pieces as possible, of about equal slack.
+
+    Args:
+        reach: int64 [n] number of samples that a piece from each sample can span.
+
+    Returns:
+        Ascending positions of the cuts.
+    """
     length = len(reach)
     ends = np.minimum(np.arange(length) + reach, length)
     need = np.zeros(length + 1, np.int64)
@@ -168,7 +175,19 @@ def _cuts(reach: Ints) -> list[int]:
 def _fit(
     outline: Outline, joints: Floats, first: Ints, length: Ints, rounds: int, *tangents: Floats
 ) -> tuple[Floats, Floats]:
-    """Control points and errors of pieces, resampled with others of like length to 8-128 points."""
+    """Fits a cubic to each piece, resampled to 8..128 points like others of similar length.
+
+    Args:
+        outline: The samples.
+        joints: float64 [n, 2] positions of joints at samples.
+        first: int64 [pieces] first sample of each piece.
+        length: int64 [pieces] number of samples that it spans.
+        rounds: Number of least-squares solutions.
+        tangents: Start and end tangents as for `fit_cubics`, or nothing.
+
+    Returns:
+        float64 [pieces, 4, 2] control points, and float64 [pieces] errors in px.
+    """
     control, error = np.zeros((len(first), 4, 2)), np.zeros(len(first))
     order = np.argsort(length, kind="stable")
     for block in np.split(order, range(512, len(order), 512)) if len(order) else ():
@@ -187,7 +206,19 @@ def _fit(
 def _fit_smooth(
     outline: Outline, joints: Floats, first: Ints, length: Ints, curved: Bools, tolerance: float
 ) -> Floats:
-    """Control points [pieces, 4, 2], with one tangent at joints where the tolerance allows it."""
+    """Fits pieces with a common tangent at joints, where the tolerance allows it.
+
+    Args:
+        outline: The samples.
+        joints: float64 [n, 2] positions of joints at samples.
+        first: int64 [pieces] first sample of each piece.
+        length: int64 [pieces] number of samples that it spans.
+        curved: bool [pieces], False for pieces that stay straight.
+        tolerance: Largest error in px.
+
+    Returns:
+        float64 [pieces, 4, 2] control points.
+    """
     last = outline.at(first, length)
     after = np.searchsorted(first, last)
     control = np.linspace(joints[first], joints[last], 4, axis=1)
@@ -214,10 +245,10 @@ def _unit(v: Floats) -> Any:
 
 
 def _settle(outline: Outline, joint: Bools, tolerance: float, step: float) -> list[Ints]:
-    """Fit, quantize, and repair until nothing is improper; changes `joint`.
+    """Fits and quantizes pieces, and repairs them until there are no `faults`; changes `joint`.
 
-    Bad pieces are first halved; then they become the straight edges of the polygon through the
-    samples. That polygon is simple, and its points lie on the grid of any `step` allowed.
+    Bad pieces are halved at first, and later replaced by straight edges through the samples. The
+    polygon through all samples is simple, and lies on the grid of every valid `step`.
     """
     exact, joints = outline.corner.copy(), outline.joints.copy()
     for attempt in range(20):
@@ -227,7 +258,8 @@ def _settle(outline: Outline, joint: Bools, tolerance: float, step: float) -> li
         curved = ~(exact[first] & exact[last] & (outline.until(outline.turns)[first] >= length))
         control = _fit_smooth(outline, joints, first, length, curved, tolerance)
         whole = np.rint(np.clip(control, 0, outline.extent) / step).astype(np.int64)
-        # Rounded thirds would bend a slanting line; handles on its ends do not.
+        # Inner control points at rounded thirds would bend a slanting line. At its ends they keep
+        # it straight.
         slanting = ~curved & (whole[:, 0] != whole[:, 3]).all(1)
         whole[slanting, 1:3] = whole[slanting][:, [0, 3]]
         heads = np.flatnonzero(np.diff(outline.base[first])) + 1

@@ -1,4 +1,4 @@
-"""How much of each pixel a planned layer covers."""
+"""Coverage of canvas pixels by a boundary at rest, as floating-point numbers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,16 @@ from ...texture.network import Floats
 
 
 def coverage_of(boundary: Boundary | None, width: int, height: int) -> Floats:
-    """Coverage float32 [width * height] of canvas pixels, 0..1; None covers all."""
+    """Coverage of the pixels of a canvas.
+
+    Args:
+        boundary: Boundary at rest; None for the whole canvas.
+        width: Width of the canvas in pixels.
+        height: Height of the canvas in pixels.
+
+    Returns:
+        float32 [width * height] in 0..1, row by row.
+    """
     paths = outline(boundary, View(0, 0, width, height, width, height))
     if paths is None:
         return np.ones(width * height, np.float32)

@@ -1,7 +1,8 @@
-"""The meshers TriWild and fTetWild, each in a process of its own that may fail.
+"""Meshers TriWild and fTetWild, each in a process of its own that may fail.
 
-They crash on some input, may never end, and their results differ from run to run. So they get
-polygons that are known to be simple, and what they return is snapped to the lattice and checked.
+They crash on some input, may never end, and their results differ from run to run. So they are given
+polygons that are known to be simple, and the meshes that they return are snapped to the lattice and
+checked.
 
 Y. Hu et al., "TriWild: robust triangulation with curve constraints", 2019;
 Y. Hu et al., "Fast tetrahedral meshing in the wild", 2020.
@@ -28,36 +29,43 @@ from ...geometry.outline import CELLS, Outline, outline
 from ...geometry.polygons import apart, winding
 
 SECONDS = 120.0
-"""How long a mesher may take."""
+"""Seconds after which a mesher is stopped."""
 
 BOX = 14
-"""Side of the square that TriWild gets to see, in target edge lengths, at least."""
+"""Least side of the square that the input of TriWild extends over, in target edge lengths."""
 
 SLAB = 0.25
-"""Thickness of the body that fTetWild fills, in target edge lengths."""
+"""Thickness of the slab that fTetWild fills, in target edge lengths."""
 
 TOLERANCE = 1.0
-"""How far outlines may move, in canvas pixels, and at most a thousandth of the input."""
+"""Largest displacement of outlines by a mesher, in canvas pixels; a thousandth of the extent of
+the input if that is less."""
 
 MISSING = 3
-"""Exit status of a process whose mesher is not installed."""
+"""Exit status of the process if its mesher is not installed."""
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
 def triwild(boundary: Boundary | None, size: tuple[int, int], edge: float) -> Base:
-    """Meshes a shape with TriWild; arguments as of `geometry.mesher.delaunay`.
+    """Meshes the shape of a layer with TriWild.
 
-    TriWild starts from a grid of a tenth of the box around its input and stops as soon as all
-    triangles are well shaped, so that on plain shapes the edge length has no effect. Two tiny
-    triangles far outside make the grid coarse and the optimization necessary. It can also be wrong
-    about what is inside small shapes, so that is found out here.
+    TriWild starts from a grid with cells of a tenth of the box around its input, and stops as soon
+    as all triangles are well shaped. So the edge length has no effect on plain shapes. Two tiny
+    triangles far outside make the grid coarse, and the optimization necessary. TriWild sometimes
+    misjudges what is inside small shapes, so this function decides it by winding numbers.
+
+    Args:
+        boundary: Boundary that encloses the shape; None for the whole canvas.
+        size: Width and height of the canvas in pixels; only used if `boundary` is None.
+        edge: Target edge length relative to the diagonal of the shape, as for
+            `geometry.mesher.delaunay`, 0.01..1.
 
     Raises:
         UsageError: `edge` is out of range.
         UnsupportedError: `wildmeshing` is not installed.
-        InputError: It fails on this shape, or takes longer than `SECONDS`.
+        InputError: TriWild fails on this shape, or takes longer than `SECONDS`.
     """
     shape = outline(boundary, size, edge)
     places = [loop * shape.scale for loop in shape.loops]
@@ -77,9 +85,20 @@ def triwild(boundary: Boundary | None, size: tuple[int, int], edge: float) -> Ba
 
 
 def ftetwild(boundary: Boundary | None, size: tuple[int, int], edge: float) -> Base:
-    """Meshes a shape with fTetWild: one side of a thin slab of it that is filled with tetrahedra.
+    """Meshes the shape of a layer with fTetWild.
 
-    Arguments and errors as of `triwild`; the package is `pytetwild`.
+    fTetWild fills a thin slab of the shape with tetrahedra; one side of the slab is the mesh.
+
+    Args:
+        boundary: Boundary that encloses the shape; None for the whole canvas.
+        size: Width and height of the canvas in pixels; only used if `boundary` is None.
+        edge: Target edge length relative to the diagonal of the shape, as for
+            `geometry.mesher.delaunay`, 0.01..1.
+
+    Raises:
+        UsageError: `edge` is out of range.
+        UnsupportedError: `pytetwild` is not installed.
+        InputError: fTetWild fails on this shape, or takes longer than `SECONDS`.
     """
     shape = outline(boundary, size, edge)
     flat = mesher.fill(shape, np.zeros((0, 2), np.int64))
@@ -104,12 +123,22 @@ def ftetwild(boundary: Boundary | None, size: tuple[int, int], edge: float) -> B
 
 
 def worker() -> list[str]:
-    """The command that runs `main` in another process; the name of the mesher follows."""
+    """Command that runs `main` in another process, but for the name of the mesher at its end."""
     return [sys.executable, "-m", __name__]
 
 
 def _run(name: str, points: Floats, parts: Ints, shape: Outline) -> tuple[Floats, Ints]:
-    """What a mesher makes of points [N, 2 or 3] and edges or faces: points and elements."""
+    """Runs a mesher in another process.
+
+    Args:
+        name: ``triwild`` or ``ftetwild``.
+        points: float64 [N, 2] or [N, 3] points, in canvas pixels.
+        parts: int64 [M, 2] edges, or [M, 3] faces of a closed surface.
+        shape: Outline that the points are made from.
+
+    Returns:
+        float64 [V, 2] points and int64 [T, 3] triangles, or [V, 3] points and [T, 4] tetrahedra.
+    """
     paths = [str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")]
     with tempfile.TemporaryDirectory() as folder:
         np.savez(
@@ -164,9 +193,15 @@ def _failure(name: str, what: str) -> InputError:
 
 
 def _snapped(name: str, places: Floats, triangles: Ints, shape: Outline) -> Base:
-    """The triangles [T, 3] with their corners [N, 2], in canvas pixels, moved to the lattice.
+    """Snaps the nodes of a mesh to the lattice of a shape.
 
-    Where that folds them, or they do not cover the shape, their corners are meshed anew.
+    If the snapped mesh is folded or does not cover the shape, its nodes are triangulated anew.
+
+    Args:
+        name: Name of the mesher.
+        places: float64 [N, 2] nodes in canvas pixels, from the corner of the lattice.
+        triangles: int64 [T, 3] triangles of any orientation.
+        shape: Outline that was meshed.
     """
     if not len(triangles):
         raise _failure(name, "returned no triangles")
@@ -183,7 +218,7 @@ def _snapped(name: str, places: Floats, triangles: Ints, shape: Outline) -> Base
 
 
 def main(name: str) -> int:
-    """Runs a mesher on ``in.npz`` in the current folder and leaves ``out.npz`` there.
+    """Runs a mesher on ``in.npz`` in the current folder and writes ``out.npz`` there.
 
     Args:
         name: ``triwild`` or ``ftetwild``.

@@ -1,4 +1,4 @@
-"""From a picture to named layers with boundaries, back to front."""
+"""Planning of layers: names and boundaries, back to front, from a picture and its masks."""
 
 from __future__ import annotations
 
@@ -19,27 +19,34 @@ from .contours import fit_paths
 from .masks import Region, resolve
 
 UNIT = 2
-"""Boundaries are fitted in quarters of a pixel."""
+"""Unit of boundaries: control points are multiples of 2**-UNIT pixel."""
 
 OVERLAP = 3
-"""Pixels that a layer reaches under those in front of it, so that nothing shines through."""
+"""Pixels by which a layer continues under those in front of it, so that nothing shines through."""
 
 SOFT_PIXELS = 16
-"""Textures give alpha if that many translucent pixels hang together away from outlines."""
+"""Least size, in pixels, of a connected translucent part away from outlines, from which on textures
+have alpha."""
 
 FINE_PIXELS = 1 << 20
-"""Up to this size outlines of transparent pictures are traced on a finer grid."""
+"""Most pixels of a transparent picture whose outlines are traced on a finer grid."""
 
 FINE = 2
-"""Binary digits of that grid: quarters of a pixel."""
+"""Base-2 logarithm of the number of points of the finer grid per pixel."""
 
 FINE_TOLERANCE: dict[str, dict[str, float]] = {"lsq": {"tolerance": 1.2}, "chamfer": {}}
-"""Fit tolerance there, in quarters of a pixel."""
+"""Options of the fit of boundaries on the finer grid, in its units."""
 
 
 @dataclass(frozen=True, eq=False)
 class LayerPlan:
-    """A layer to be: its name, boundary (None = the whole canvas), and mesh."""
+    """Plan of a layer.
+
+    Attributes:
+        name: Name of the layer.
+        boundary: Boundary at rest; None for the whole canvas.
+        mesh: Mesh of the layer, or None.
+    """
 
     name: str
     boundary: Boundary | None
@@ -48,7 +55,13 @@ class LayerPlan:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Layers back to front, the channels of their textures, and whether they cover the canvas."""
+    """Plan of the layers of a picture.
+
+    Attributes:
+        layers: Layers, back to front.
+        channels: Channels of their textures: 3 for colour, 4 for colour and alpha.
+        opaque: Whether the back layer covers the whole canvas.
+    """
 
     layers: tuple[LayerPlan, ...]
     channels: int
@@ -56,10 +69,19 @@ class Plan:
 
 
 def plan_layers(picture: Floats, settings: Settings, masks: Sequence[Region] | None) -> Plan:
-    """Decomposes a picture [H, W, 4] with straight alpha.
+    """Decomposes a picture into layers.
+
+    Args:
+        picture: float32 [H, W, 4] in 0..1 with straight alpha.
+        settings: Settings of the encoder.
+        masks: Layers given by the user, back to front; None to find them by the segmenter.
+
+    Returns:
+        The plan, without meshes. A picture that is clear everywhere has one layer called ``empty``.
 
     Raises:
-        InputError: A mask does not fit the picture.
+        InputError: A mask is invalid or does not fit the picture, or there are too many.
+        UsageError: There is no such segmenter.
     """
     height, width = picture.shape[:2]
     alpha = picture[..., 3]
@@ -69,7 +91,7 @@ def plan_layers(picture: Floats, settings: Settings, masks: Sequence[Region] | N
     soft = bool(sizes.max(initial=0) >= SOFT_PIXELS)
     support = None if opaque else alpha >= 0.5
     if support is not None and soft:
-        # Crisp outlines stay where they are; only translucent parts reach beyond.
+        # Crisp outlines stay where they are; only translucent parts extend the support.
         around = _dilate(translucent, 3)
         support |= around if settings.pyramid else around & (alpha > 0)
     if support is not None and not support.any():
@@ -85,7 +107,7 @@ def plan_layers(picture: Floats, settings: Settings, masks: Sequence[Region] | N
         segment = plugins.find("segmenters", settings.segmenter)
         regions = segment(rgb, settings.max_layers, support)
     outline = alpha if not opaque and not soft and height * width <= FINE_PIXELS else None
-    # Planes hold one alpha a sample: layers on top of each other would show it twice.
+    # The planes hold one alpha per sample, which overlapping layers would apply twice.
     overlap = 0 if soft and settings.pyramid else OVERLAP
     layers = []
     for k, region in enumerate(regions):
@@ -101,7 +123,14 @@ def plan_layers(picture: Floats, settings: Settings, masks: Sequence[Region] | N
 
 
 def _boundary(mask: NDArray[np.bool_], outline: Floats | None, settings: Settings) -> Boundary:
-    """Fits a mask; with `outline`, an alpha plane, at the resolution of the stored units."""
+    """Fits a boundary to a mask.
+
+    Args:
+        mask: bool [H, W], True inside.
+        outline: float32 [H, W] alpha whose 0.5 contour is traced on the finer grid, within the
+            mask; or None.
+        settings: Settings of the encoder.
+    """
     fit_method: Callable[..., list[NDArray[np.int64]]] = fit_paths
     if settings.boundary == "chamfer":
         from .chamfer import fit_paths_chamfer
@@ -111,7 +140,7 @@ def _boundary(mask: NDArray[np.bool_], outline: Floats | None, settings: Setting
         return Boundary(UNIT, tuple(fit_method(mask, step=2.0**-UNIT)))
     size = (mask.shape[1] << FINE, mask.shape[0] << FINE)
     inside = cv2.resize(outline, size, interpolation=cv2.INTER_LINEAR) >= 0.5
-    # One pixel of slack: alpha >= 0.5 between pixels may lie just outside the pixel mask.
+    # One pixel of slack, because interpolated alpha may reach 0.5 just outside the mask.
     near = cv2.resize(_dilate(mask, 1).astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)
     fine = inside & (near > 0)
     if not fine.any():
@@ -137,7 +166,7 @@ def _check_masks(masks: Sequence[Region]) -> None:
 
 
 def _translucent(alpha: Floats) -> NDArray[np.bool_]:
-    """Pixels between clear and solid that are not the smooth rim of an outline."""
+    """Translucent pixels, bool [H, W], except for the anti-aliased rims of outlines."""
     inside = alpha >= 0.5
     rim = _dilate(inside, 2) & _dilate(~inside, 2)
     return (alpha > 0.03) & (alpha < 0.97) & ~rim

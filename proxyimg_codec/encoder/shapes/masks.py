@@ -1,4 +1,4 @@
-"""Regions of a picture: masks given by the user, valid stacks of them, order and names."""
+"""Regions of a picture: masks given by the user, their stacking order, and their names."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -21,11 +21,11 @@ _HUES = ((10, "pink"), (47, "red"), (78, "orange"), (108, "yellow"), (165, "gree
 
 @dataclass(frozen=True)
 class Region:
-    """One future layer.
+    """Mask with a name, from which a layer is made.
 
     Attributes:
-        name: What the layer will be called.
-        mask: bool [H, W], True where the layer is.
+        name: Name of the layer.
+        mask: bool [H, W], True for the pixels of the layer.
     """
 
     name: str
@@ -33,15 +33,18 @@ class Region:
 
 
 def load_masks(path: str | Path, width: int, height: int) -> list[Region]:
-    """Read the masks that a user made for a picture of `width` x `height` pixels.
+    """Reads the masks that a user made for a picture.
+
+    A folder of PNG files holds one binary mask in each. The natural order of the file names is back
+    to front, with `back` or `background` first. A region has the name of its file without a number
+    in front: `2 cat.png` is `cat`. Inside is where alpha is at least 128 if the file has
+    transparency; otherwise where luminance is at least 128, or not 0 in files that never reach 128.
+
+    A single PNG file holds labels: 0 for the back layer, then 1, 2, ... for objects back to front.
+    A grey value is its label; colours are labelled in the order of their packed values 0xRRGGBB.
 
     Args:
-        path: A folder of PNG files, one binary mask each (inside: luminance >= 128, or any
-            non-zero value where that is never reached; with transparency, alpha >= 128), put
-            back to front in the natural order of the file names, `back` or `background` first,
-            and named by them without a number in front (`2 cat.png` is `cat`). Or one label
-            PNG: label 0 is the back layer, 1, 2, ... are objects back to front. A grey value is
-            its label; distinct colours are labelled in the order of their packed value 0xRRGGBB.
+        path: Folder of masks, or file of labels.
         width: Width of the picture in pixels.
         height: Height of the picture in pixels.
 
@@ -49,8 +52,8 @@ def load_masks(path: str | Path, width: int, height: int) -> list[Region]:
         Regions back to front. They may overlap, and need not cover the picture: see `resolve`.
 
     Raises:
-        InputError: Nothing is there, a file is no PNG, has the wrong size, or has more than
-            `MAX_LABELS` labels.
+        InputError: There is no PNG file, or a file cannot be read, is no PNG, has the wrong size
+            or 16 bits per channel, or has more than `MAX_LABELS` labels.
     """
     path = Path(path)
     if not path.is_dir():
@@ -67,7 +70,7 @@ def resolve(
     width: int,
     support: NDArray[np.bool_] | None = None,
 ) -> list[Region]:
-    """Make a valid layer stack: disjoint masks whose union is the picture or its support.
+    """Makes masks disjoint, so that their union is the picture or its support.
 
     A pixel in several masks goes to the frontmost. Pixels in none go to the back layer of an
     opaque picture, which is made if there is none, or to a new rearmost region `rest` of a
@@ -75,11 +78,11 @@ def resolve(
     unique: `cat`, `cat 2`.
 
     Args:
-        regions: Masks back to front, each [height, width]; may overlap.
+        regions: Regions back to front, with masks bool [height, width] that may overlap.
         height: Height of the picture in pixels.
         width: Width of the picture in pixels.
-        support: bool [height, width], where the alpha of the picture is above zero; None for
-            an opaque picture.
+        support: bool [height, width], True for pixels that belong to a layer; None for all pixels
+            of an opaque picture.
 
     Returns:
         Disjoint, non-empty regions back to front; none if the support is empty.
@@ -112,7 +115,7 @@ def resolve(
 
 
 def unique_names(names: Iterable[str]) -> list[str]:
-    """Number repeated names, in their order: `cat`, `cat` become `cat`, `cat 2`."""
+    """Numbers repeated names, in their order: `cat`, `cat` become `cat`, `cat 2`."""
     names = list(names)
     taken, result = set(names), list[str]()
     for name in names:
@@ -125,13 +128,14 @@ def unique_names(names: Iterable[str]) -> list[str]:
 
 
 def nearness(mask: NDArray[np.bool_], salience: float) -> float:
-    """Guess how near a region is; only the order of the values means something.
+    """Estimates how near a region is to the viewer; only the order of values has a meaning.
 
-    Near is salient, low and compact; far holds the frame of the picture, above all its top.
+    Near regions are salient, low in the picture and compact. Far ones lie along the frame of the
+    picture, above all at its top.
 
     Args:
         mask: bool [H, W], not empty.
-        salience: Mean saliency in 0..1.
+        salience: Mean saliency of the region in 0..1.
     """
     height, width = mask.shape
     down = (np.arange(height) + 0.5) / height
@@ -144,11 +148,11 @@ def nearness(mask: NDArray[np.bool_], salience: float) -> float:
 
 
 def description(rgb: NDArray[np.uint8], mask: NDArray[np.bool_]) -> str:
-    """Name a region by mean colour and place, such as `red center` or `dark bottom left`.
+    """Names a region by its mean colour and place, such as `red center` or `dark bottom left`.
 
     Args:
-        rgb: uint8 [H, W, 3], sRGB.
-        mask: bool [H, W], not empty.
+        rgb: uint8 [H, W, 3] picture in sRGB.
+        mask: bool [H, W] pixels of the region, not empty.
     """
     height, width = mask.shape
     y = float(mask.sum(1) @ np.arange(height)) / mask.sum() / height
@@ -170,7 +174,7 @@ def _colour_word(rgb: NDArray[np.float32]) -> str:
 
 
 def _name(file: Path) -> str:
-    """The file's stem without the number that orders it, as valid Unicode, short enough."""
+    """Name of a region: stem of its file without the number in front, at most 200 characters."""
     stem = file.stem.encode("utf-8", "replace").decode()
     return re.sub(r"^\d+[ ._-]+(?=.)", "", stem)[:200]
 
@@ -180,14 +184,14 @@ def _is_back(region: Region) -> bool:
 
 
 def _stack_order(file: Path) -> tuple[bool, list[tuple[int, str]], str]:
-    """Natural order: `object 2` before `object 10`; the background before everything."""
+    """Sort key for natural order: `object 2` before `object 10`, the background before all."""
     parts = re.findall(r"\d+|\D+", file.stem.lower())
     natural = [(int(p), "") if p.isdecimal() else (-1, p) for p in parts]
     return file.stem.lower() not in _BACK_NAMES, natural, file.name
 
 
 def _read(path: Path, width: int, height: int) -> NDArray[np.uint8]:
-    """Read a PNG as uint8 [H, W] or [H, W, 3 or 4] (BGR, A)."""
+    """Reads a PNG file as uint8 [H, W], or [H, W, 3 or 4] with channels B, G, R, A."""
     try:
         data = np.frombuffer(path.read_bytes(), np.uint8)
     except OSError as error:
@@ -212,12 +216,12 @@ def _check_size(what: str, mask: NDArray[np.generic], width: int, height: int) -
 
 
 def _binary(image: NDArray[np.uint8]) -> NDArray[np.bool_]:
-    """Inside or outside: by alpha where the file uses it, else by luminance."""
+    """Decides by alpha, or by luminance if the file has no transparency, what is inside."""
     if image.ndim == 3 and image.shape[2] == 4 and image[..., 3].min() < 255:
         return np.asarray(image[..., 3] >= 128)
     if image.ndim == 3:
         image = np.asarray(cv2.cvtColor(image[..., :3], cv2.COLOR_BGR2GRAY), np.uint8)
-    # Masks saved as 0 and 1 look black, but mean the same.
+    # Some programs save masks as 0 and 1.
     return image >= (128 if image.max() >= 128 else 1)
 
 

@@ -1,4 +1,4 @@
-"""Proxy nodes of the layers that are encoded: a base mesh, refined where the picture has detail."""
+"""Meshes of the layers that are encoded: a base, refined where the picture has detail."""
 
 from __future__ import annotations
 
@@ -19,23 +19,28 @@ from ..settings import Settings
 from .layers import Plan
 
 HIERARCHIES_FRONT, HIERARCHIES_BACK = 3, 2
-"""Hierarchies, the base included (ProxyImg, h_f and h_b)."""
+"""Number of hierarchies of objects and of the back, base included (ProxyImg, h_f and h_b)."""
 
 Mesher = Callable[[Boundary | None, tuple[int, int], float], Base]
 
 
 def with_meshes(picture: Floats, plan: Plan, settings: Settings) -> Plan:
-    """`plan` with a mesh for each layer, as `settings.mesh` asks for.
+    """Makes a mesh for each layer of a plan, if the settings ask for meshes.
 
-    A lone back layer has one only if its features come from it, and is then no background.
+    A back layer that is the only layer gets a mesh for node sampling only, as fine as that of an
+    object.
 
     Args:
-        picture: float32 [H, W, 4], premultiplied.
-        plan: Layers back to front.
-        settings: ``mesher`` is the name of a mesher, or ``none``.
+        picture: float32 [H, W, 4] premultiplied picture in 0..1.
+        plan: Plan of the layers.
+        settings: Settings of the encoder.
+
+    Returns:
+        The plan with meshes; `plan` itself if there are none.
 
     Raises:
         UsageError: There is no such mesher.
+        UnsupportedError: The mesher is not installed.
         InputError: An external mesher failed.
     """
     lone = len(plan.layers) == 1 and plan.layers[0].boundary is None
@@ -54,7 +59,7 @@ def with_meshes(picture: Floats, plan: Plan, settings: Settings) -> Plan:
 
 
 def children(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Corners [4 n, 3, 2] of the four children of triangles [n, 3, 2], in the order of a mesh."""
+    """Corners [4 n, 3, 2] of the children of triangles [n, 3, 2], in the order of `refine`."""
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     d, e, f = (a + b) / 2, (b + c) / 2, (c + a) / 2
     four = np.stack([a, d, f, d, b, e, f, e, c, d, e, f], axis=1)
@@ -62,16 +67,21 @@ def children(corners: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def gradient(picture: Floats) -> Floats:
-    """Magnitude of the Sobel gradient [H, W] of the mean of the channels."""
+    """Magnitude float32 [H, W] of the Sobel gradient of the mean of red, green and blue."""
     grey = np.ascontiguousarray(picture[..., :3].mean(2))
     dx, dy = (cv2.Sobel(grey, cv2.CV_32F, *d) for d in ((1, 0), (0, 1)))
     return np.asarray(np.hypot(dx, dy), np.float32)
 
 
 def refined(mesh: Mesh, detail: Floats, hierarchies: int) -> Mesh:
-    """The mesh with triangles split 1 to 4 where the mean gradient inside exceeds the picture's.
+    """Splits triangles into four where the mean of `detail` inside exceeds that of the picture.
 
-    Triangles that hold no more than one pixel stay whole (ProxyImg, refinement).
+    Triangles of at most one pixel stay whole (ProxyImg, refinement).
+
+    Args:
+        mesh: Mesh without split flags.
+        detail: float32 [H, W] gradient magnitude of the picture.
+        hierarchies: Most hierarchies, base included.
     """
     height, width = detail.shape
     threshold = float(detail.mean())

@@ -1,4 +1,4 @@
-"""Closed cubic paths: samples of an outline, least-squares fitting, an exact test for crossings."""
+"""Closed paths of cubic Bézier segments: samples of a mask's outline, fit, test for crossings."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -11,22 +11,22 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 CHORDS = 16  # straight edges that one cubic is flattened to
-_LONG = 6  # px; two runs of at least this length meet in a real corner, not in a staircase
+_LONG = 6  # px; two straight runs of at least this length meet in a real corner, not in a staircase
 
 
 @dataclass(frozen=True)
 class Outline:
-    """Samples along all loops of a mask, one loop after another; coordinates in px.
+    """Samples along all loops around a mask, one loop after another; coordinates are in px.
 
     Attributes:
-        points: float64 [n, 2], midpoints of the crack edges, and the corners to be kept.
-        joints: float64 [n, 2], the same smoothed: where a joint at that sample goes.
-        corner: bool [n], the corners to be kept.
-        turns: bool [n], False where the sample lies straight between its neighbours.
-        base: int64 [n], first sample of the sample's loop.
-        size: int64 [n], number of samples of the sample's loop.
+        points: float64 [n, 2] midpoints of the pixel edges along the loop, and the corners to keep.
+        joints: float64 [n, 2] smoothed samples; a joint of two segments at a sample is put there.
+        corner: bool [n], True for the corners to keep.
+        turns: bool [n], False if a sample and its two neighbours lie on a line.
+        base: int64 [n] index of the first sample of the same loop.
+        size: int64 [n] number of samples of the same loop.
         positive: bool [loops], True for outer contours.
-        extent: float64 [2], width and height of the canvas.
+        extent: float64 [2] width and height of the canvas.
     """
 
     points: Floats
@@ -39,12 +39,15 @@ class Outline:
     extent: Floats
 
     def at(self, sample: Ints, offset: Ints | int) -> Ints:
-        """Index of the sample `offset` places further along the same loop; they broadcast."""
+        """Index of the sample `offset` places further along the same loop; arrays broadcast."""
         base = self.base[sample]
         return base + (sample - base + offset) % self.size[sample]
 
     def until(self, flag: Bools) -> Ints:
-        """Places from every sample on to the next flagged one of its loop (its size if none)."""
+        """Number of places from each sample to the next flagged one of its loop, int64 [n].
+
+        If no sample of the loop is flagged, it is the size of the loop. `flag` is bool [n].
+        """
         every, marked = np.arange(len(flag)), np.append(np.flatnonzero(flag), len(flag))
         stop = self.base + self.size
         after = marked[np.searchsorted(marked[:-1], every, "right")]
@@ -54,7 +57,12 @@ class Outline:
 
     @classmethod
     def of(cls, loops: list[Floats], shape: tuple[int, ...]) -> "Outline":
-        """Sample loops of `trace`, float64 [corners, 2] each, on a canvas of shape (H, W)."""
+        """Samples loops.
+
+        Args:
+            loops: Loops of `trace`, float64 [corners, 2] each.
+            shape: Height and width of the canvas.
+        """
         extent = np.array(shape[1::-1], np.float64)
         vertex, count = np.concatenate(loops), np.array([len(p) for p in loops])
         head = np.cumsum(count) - count
@@ -63,7 +71,7 @@ class Outline:
         leg = vertex[after] - vertex
         length, way = np.abs(leg).sum(1).astype(np.int64), np.sign(leg)
         corner = _corners(vertex, way, length, after, extent)
-        # A leg gives its first vertex, if that is a corner, and the midpoints of its edges.
+        # A straight run gives its first vertex, if that is a corner, and midpoints of pixel edges.
         index, place = spread(length + corner)
         place -= corner[index]
         points = vertex[index] + way[index] * np.maximum(place + 0.5, 0)[:, None]
@@ -82,7 +90,7 @@ class Outline:
 
 
 def _corners(vertex: Floats, way: Floats, length: Ints, after: Ints, extent: Floats) -> Any:
-    """Tell the vertices to be kept from those of staircases."""
+    """Tells the vertices to keep from those of staircases, bool [vertices]."""
     before = np.argsort(after)
     turn = _cross(way[before], way)
     bulge = (turn == turn[before]) & (turn == turn[after])
@@ -90,7 +98,7 @@ def _corners(vertex: Floats, way: Floats, length: Ints, after: Ints, extent: Flo
     border = ((vertex == vertex[after]) & ((vertex == 0) | (vertex == extent))).any(1)
     border &= length > 1
     _, twin, seen = np.unique(vertex, axis=0, return_inverse=True, return_counts=True)
-    # Where two loops meet in a point, cutting the corners keeps them apart.
+    # A vertex that two loops share is not kept: cutting the corner off keeps the loops apart.
     return (bulge | long | border | border[before]) & (seen[twin.reshape(-1)] == 1)
 
 
@@ -100,7 +108,11 @@ def area(loop: Floats) -> float:
 
 
 def spread(length: Ints) -> tuple[Ints, Ints]:
-    """For pieces of these lengths, the piece and the place in it of every member, int64 [sum]."""
+    """Enumerates the members of pieces of given lengths.
+
+    Returns:
+        int64 [sum of lengths] number of the piece of each member, and its place in the piece.
+    """
     piece = np.repeat(np.arange(len(length)), length)
     return piece, np.arange(len(piece)) - np.repeat(np.cumsum(length) - length, length)
 
@@ -108,22 +120,23 @@ def spread(length: Ints) -> tuple[Ints, Ints]:
 def fit_cubics(
     points: Floats, start: Floats | None = None, end: Floats | None = None, *, rounds: int = 4
 ) -> tuple[Floats, Floats]:
-    """Fit one cubic to each of many runs of points, all at once.
+    """Fits one cubic to each of many runs of points, all at once.
 
-    The ends are kept, the inner control points are a least-squares solution, and the parameters
-    are improved by Gauss-Newton steps in between (Schneider 1990, "An algorithm for automatically
-    fitting digitized curves", Graphics Gems).
+    The ends are kept. The inner control points are a least-squares solution. Between solutions, the
+    parameters of the points are improved by Gauss-Newton steps (Schneider 1990, "An algorithm for
+    automatically fitting digitized curves", Graphics Gems).
 
     Args:
-        points: float64 [runs, n >= 2, 2]; no run may have length zero.
-        start: float64 [runs, 2], unit tangents at the first points, pointing along the run, or
-            None to leave the directions free.
-        end: float64 [runs, 2], at the last points, pointing back; given together with `start`.
-        rounds: least-squares solutions per run, >= 1.
+        points: float64 [runs, n, 2] points, n >= 2; no run may have length zero.
+        start: float64 [runs, 2] unit tangents at the first points, pointing along the run; None
+            leaves the directions free.
+        end: float64 [runs, 2] unit tangents at the last points, pointing back; given if and only
+            if `start` is.
+        rounds: Number of least-squares solutions per run, at least 1.
 
     Returns:
-        Control points, float64 [runs, 4, 2], and the largest distance between a point of the run
-        and the curve at that point's parameter, float64 [runs], in the unit of `points`.
+        float64 [runs, 4, 2] control points, and float64 [runs] the largest distance between a point
+        of the run and the curve at its parameter, in the unit of `points`.
     """
     first, last = points[:, :1], points[:, -1:]
     u = np.zeros(points.shape[:2])
@@ -147,7 +160,7 @@ def fit_cubics(
 
 
 def _handles(gram: Floats, moment: Floats, start: Floats | None, end: Floats | None) -> Floats:
-    """Solve the 2x2 normal equations; returns C1 - P0 and C2 - P1, float64 [runs, 2, 2]."""
+    """Solves the 2x2 normal equations; returns C1 - P0 and C2 - P1, float64 [runs, 2, 2]."""
     p, q, r = gram[:, 0, 0, None], gram[:, 0, 1, None], gram[:, 1, 1, None]
     one, two = moment[:, 0], moment[:, 1]
     if start is not None and end is not None:
@@ -156,26 +169,31 @@ def _handles(gram: Floats, moment: Floats, start: Floats | None, end: Floats | N
     scale = np.maximum(p * r - q * q, 1e-9)
     one, two = (r * one - q * two) / scale, (p * two - q * one) / scale
     if start is not None and end is not None:
-        # Handles that point backwards would make cusps; the error then tells the caller.
+        # Handles that point backwards would make cusps. Without them the error is large, so that
+        # the caller rejects the fit.
         one, two = np.maximum(one, 0) * start, np.maximum(two, 0) * end
     return np.stack([one, two], 1)
 
 
 def segments(path: Ints) -> Ints:
-    """The m cubic segments of a closed path [3m, 2], as [m, 4, 2]; ends are shared."""
+    """Segments [m, 4, 2] of a closed path [3m, 2]; each ends where the next one begins."""
     quads = path.reshape(-1, 3, 2)
     return np.concatenate([quads, np.roll(quads[:, :1], -1, 0)], 1)
 
 
 def flatten(control: NDArray[Any]) -> Any:
-    """Points of cubics [n, 4, 2] at t = k/16, times 4096: [n, 17, 2], exact below 2**17."""
+    """Points of cubics [n, 4, 2] at t = k/16, k = 0..16, times 4096.
+
+    Returns:
+        [n, 17, 2] of the type of `control`; exact for integers below 2**17 in magnitude.
+    """
     k = np.arange(CHORDS + 1)
     j = CHORDS - k
     return np.stack([j**3, 3 * j * j * k, 3 * j * k * k, k**3], 1) @ control
 
 
 def distance(points: Floats, control: Floats) -> Any:
-    """Distance of each point [n, 2] from its own flattened cubic [n, 4, 2], float64 [n]."""
+    """Distance float64 [n] of each point [n, 2] from its own flattened cubic [n, 4, 2]."""
     line = flatten(control) / CHORDS**3
     a, d = line[:, :-1], np.diff(line, axis=1)
     rel = points[:, None] - a
@@ -184,18 +202,19 @@ def distance(points: Floats, control: Floats) -> Any:
 
 
 def faults(paths: list[Ints], positive: Bools) -> list[Bools]:
-    """Find the segments that make a boundary improper.
+    """Finds the segments that make a boundary improper.
 
-    Paths are judged as polygons of `CHORDS` edges a segment, exactly; a touch is a crossing.
+    Paths are tested as polygons of `CHORDS` edges per segment, with exact integers. A touch counts
+    as a crossing.
 
     Args:
-        paths: the closed paths, int64 [3m, 2] each, |values| below 2**17.
-        positive: bool [paths], the orientation wanted: True for outer contours.
+        paths: Closed paths, int64 [3m, 2] each, less than 2**17 in magnitude.
+        positive: bool [paths], True for paths that should be outer contours, with positive area.
 
     Returns:
-        A bool [m] for each path: True where the segment crosses or touches another part of the
-        boundary or folds back onto itself, and for every segment of a path whose signed area has
-        the wrong sign or is zero.
+        For each path bool [m], True for segments that cross or touch another part of the boundary
+        or fold back onto themselves, and for all segments of a path whose signed area is zero or
+        has the wrong sign.
     """
     if not paths:
         return []
@@ -228,7 +247,15 @@ def _astride(a: Ints, b: Ints, c: Ints, d: Ints) -> Any:
 
 
 def _near(low: Ints, high: Ints) -> tuple[Ints, Ints]:
-    """Pairs i < j of boxes that meet, found on a grid of about as many cells as boxes."""
+    """Pairs of boxes that meet, found on a grid of about as many cells as boxes.
+
+    Args:
+        low: int64 [n, 2] least corners of the boxes.
+        high: int64 [n, 2] greatest corners.
+
+    Returns:
+        Numbers i and j of the boxes of each pair, with i < j.
+    """
     base = low.min(0)
     cell = max(1, int(np.sqrt(np.prod((high.max(0) - base) / np.sqrt(len(low))))))
     c0, c1 = (low - base) // cell, (high - base) // cell

@@ -1,9 +1,9 @@
-"""The built-in decomposition of a picture into a few layers, without trained weights.
+"""Built-in segmenter: decomposes a picture into a few layers, without trained weights.
 
-Superpixels are merged greedily by colour, texture, the edge between them and saliency, at
-about 256 pixels; the regions that remain get smooth borders that follow the picture's edges.
-Saliency is robust background detection (Zhu et al., 2014): what a smooth path of colours joins
-to much of the picture's frame is background.
+In a picture reduced to about 256 pixels a side, superpixels are merged greedily by colour, texture,
+saliency, and the edge between them. The remaining regions get smooth borders that follow the edges
+of the picture. Saliency comes from robust background detection (Zhu et al., 2014): an area is
+background if smooth paths of colours join it to much of the frame of the picture.
 """
 
 import cv2
@@ -19,33 +19,30 @@ Mask = NDArray[np.bool_]
 
 WORK_SIDE, REFINE_SIDE, SUPERPIXELS = 256, 640, 360
 MIN_SIDE, MIN_AREA = 12, 0.01
-# Weights that bring the features of a superpixel to the scale of Lab distances.
+# Weights that bring the features of superpixels to the scale of distances in Lab.
 LIGHTNESS, TEXTURE, SALIENCY = 0.7, 4.0, 60.0
-# Merging: weight of the edge; powers of size and border length in the cost; its factor for
-# regions that do not touch; the cost above which two regions are worth keeping apart.
+# Cost of a merge: weight of the edge, powers of size and of border length, factor for regions that
+# do not touch; and the cost above which two regions stay apart.
 EDGE, SIZE_POWER, BORDER, APART, KEEP = 0.1, 0.5, 0.6, 3.0, 50.0
-# Border refinement, in pixels at WORK_SIDE; the guide is Lab / 100.
+# Refinement of borders: lengths are pixels at WORK_SIDE; the guide is Lab / 100.
 GUIDE_RADIUS, GUIDE_EPS, SMOOTH = 3, 1e-4, 1.5
 
 
 def segment(
     rgb: NDArray[np.uint8], max_layers: int = 4, support: Mask | None = None
 ) -> list[Region]:
-    """Split a picture into a few plausible layers.
-
-    Deterministic. Fewer than `max_layers` come back where the picture asks for no more: a
-    uniform or tiny one is a single region.
+    """Splits a picture into a few plausible layers; deterministic.
 
     Args:
-        rgb: uint8 [H, W, 3], sRGB.
-        max_layers: The most regions to return, >= 1.
-        support: bool [H, W], the pixels to segment (where alpha is above zero); None for all
-            of an opaque picture.
+        rgb: uint8 [H, W, 3] picture in sRGB.
+        max_layers: Most regions to return, at least 1. There are fewer if the picture has fewer
+            distinct regions; a uniform or tiny picture is a single one.
+        support: bool [H, W], True for the pixels to segment; None for all of an opaque picture.
 
     Returns:
-        Disjoint regions back to front, whose union is the picture or the support; the rearmost
-        of an opaque picture is named `back`, the others by colour and place. Empty only if the
-        support is.
+        Disjoint regions back to front, whose union is the picture or the support. The rearmost of
+        an opaque picture is named `back`, the others by colour and place. The list is empty only
+        if the support is.
     """
     whole = np.ones(rgb.shape[:2], np.bool_) if support is None else support
     if not whole.any():
@@ -57,7 +54,7 @@ def segment(
     full = _refined(_spread(labels), rgb, whole)
     masks = {i: whole & (full == i) for i in range(int(labels.max()) + 1)}
     salience = {i: float(salient[labels == i].mean()) for i in masks if masks[i].any()}
-    # Sorted by nearness: the list holds back to front.
+    # Ascending nearness is back to front.
     back_to_front = sorted(salience, key=lambda i: nearness(masks[i], salience[i]))
     names = [description(rgb, masks[i]) for i in back_to_front]
     if support is None:
@@ -67,9 +64,12 @@ def segment(
 
 
 def _reduced(rgb: NDArray[np.uint8], support: Mask, side: int) -> tuple[Image, Mask]:
-    """Reduce to at most `side` pixels: Lab float32 [h, w, 3] and the support bool [h, w].
+    """Reduces a picture to at most `side` pixels a side.
 
-    Colours outside the support mean nothing, so they are left out of every average.
+    Colours outside the support are arbitrary, so they are left out of every average.
+
+    Returns:
+        float32 [h, w, 3] picture in Lab, and bool [h, w] support.
     """
     height, width = support.shape
     scale = min(1.0, side / max(height, width))
@@ -84,7 +84,17 @@ def _reduced(rgb: NDArray[np.uint8], support: Mask, side: int) -> tuple[Image, M
 
 
 def _merged(lab: Image, inside: Mask, max_layers: int, opaque: bool) -> tuple[Labels, Floats]:
-    """Labels of the merged regions (-1 outside) and saliency in 0..1, both [h, w]."""
+    """Merges superpixels to regions.
+
+    Args:
+        lab: float32 [h, w, 3] picture in Lab.
+        inside: bool [h, w] support.
+        max_layers: Most regions.
+        opaque: Whether the picture is opaque; only then saliency is used.
+
+    Returns:
+        int [h, w] label of each pixel, -1 outside; and float64 [h, w] saliency in 0..1.
+    """
     smooth = np.asarray(cv2.bilateralFilter(lab, 5, 12, 3), np.float32)
     parts = _superpixels(smooth, inside)
     count = int(parts.max()) + 1
@@ -95,7 +105,7 @@ def _merged(lab: Image, inside: Mask, max_layers: int, opaque: bool) -> tuple[La
 
     colour = np.stack([mean(smooth[..., c]) for c in range(3)], 1)
     shared, edge = _adjacency(parts, smooth)
-    # Deviation within superpixels, where their neighbours have it too: edges are no texture.
+    # Deviation within superpixels is texture only if their neighbours have it too, else an edge.
     detail = mean(np.abs(lab - colour[parts]).sum(2))
     around = (shared > 0) @ detail / np.maximum((shared > 0).sum(1), 1)
     colour *= (LIGHTNESS, 1, 1)
@@ -112,7 +122,7 @@ def _merged(lab: Image, inside: Mask, max_layers: int, opaque: bool) -> tuple[La
 
 
 def _superpixels(lab: Image, inside: Mask) -> Labels:
-    """Superpixels [h, w] numbered from 0; -1 outside."""
+    """Superpixel of each pixel, int [h, w], numbered from 0; -1 outside."""
     step = max(4, round((lab.shape[0] * lab.shape[1] / SUPERPIXELS) ** 0.5))
     levels = np.clip(lab * (2.55, 1, 1) + (0, 128, 128), 0, 255).astype(np.uint8)
     slic = cv2.ximgproc.createSuperpixelSLIC(levels, cv2.ximgproc.SLIC, step, 12.0)
@@ -124,11 +134,19 @@ def _superpixels(lab: Image, inside: Mask) -> Labels:
 
 
 def _adjacency(parts: Labels, lab: Image) -> tuple[Floats, Floats]:
-    """Length of the shared border and the edge strength summed along it, both [N, N]."""
+    """Length of the border that two superpixels share, and the edge strength summed along it.
+
+    Args:
+        parts: int [h, w] superpixel of each pixel, or -1.
+        lab: float32 [h, w, 3] picture in Lab.
+
+    Returns:
+        Two symmetric arrays float64 [N, N].
+    """
     soft = cv2.GaussianBlur(lab, (0, 0), 1.0)
     across, down = (cv2.Sobel(soft, cv2.CV_32F, *d) / 4 for d in ((1, 0), (0, 1)))
     strength = np.sqrt((across**2 + down**2).sum(2)) / 2
-    # Edges amid many others are texture.
+    # Edges among many others are texture.
     strength /= 1 + cv2.GaussianBlur(strength, (0, 0), 6) / 6
     count = int(parts.max()) + 1
     shared, edge = np.zeros((2, count, count))
@@ -141,7 +159,17 @@ def _adjacency(parts: Labels, lab: Image) -> tuple[Floats, Floats]:
 
 
 def _saliency(colour: Floats, place: Floats, touching: Mask, frame: Mask) -> Floats:
-    """Saliency [N] in 0..1 of superpixels by robust background detection."""
+    """Saliency of superpixels by robust background detection.
+
+    Args:
+        colour: float64 [N, 3] mean colours in Lab.
+        place: float64 [N, 2] centres, relative to the longer side of the picture.
+        touching: bool [N, N], True for superpixels that share a border.
+        frame: bool [N], True for those at the frame of the picture.
+
+    Returns:
+        float64 [N] in 0..1.
+    """
     apart = np.linalg.norm(colour[:, None] - colour, axis=2)
     path = np.where(touching | (frame[:, None] & frame), np.maximum(apart - 3, 0), np.inf)
     np.fill_diagonal(path, 0)
@@ -152,7 +180,7 @@ def _saliency(colour: Floats, place: Floats, touching: Mask, frame: Mask) -> Flo
     near = np.exp(-8 * ((place[:, None] - place) ** 2).sum(2))
     contrast = _unit((apart * near) @ back / near.sum(1).mean(), 10)
     bond = np.where(touching, np.exp(-((apart / 11) ** 2)) + 0.02, 0)
-    # Least squares: 0 in the background, 1 where contrast is, equal across bonds (Jacobi).
+    # Least squares by Jacobi iteration: 0 in the background, 1 at contrast, equal across bonds.
     total, salient = 5 * back + contrast + bond.sum(1) + 1e-6, contrast
     for _ in range(100):
         salient = (contrast + bond @ salient) / total
@@ -160,12 +188,19 @@ def _saliency(colour: Floats, place: Floats, touching: Mask, frame: Mask) -> Flo
 
 
 def _unit(values: Floats, least: float) -> Floats:
-    """Stretch to 0..1, but a range below `least` by no more than that would be."""
+    """Maps values to 0..1 linearly; their range counts as `least` if it is smaller."""
     return np.asarray((values - values.min()) / max(float(np.ptp(values)), least))
 
 
 class _Merger:
-    """Greedy merging of a region graph; the arrays are [N] or [N, N], by region."""
+    """Greedy merging of the regions of a graph.
+
+    Args:
+        features: float64 [N, F] mean features of each region.
+        area: float64 [N] pixels of each region.
+        shared: float64 [N, N] length of the border that two regions share.
+        edge: float64 [N, N] edge strength summed along it.
+    """
 
     def __init__(self, features: Floats, area: Floats, shared: Floats, edge: Floats) -> None:
         self.features, self.area, self.shared, self.edge = features, area, shared, edge
@@ -174,24 +209,24 @@ class _Merger:
         self.allow_apart(1e9)
 
     def allow_apart(self, factor: float) -> None:
-        """Let regions that do not touch merge, at `factor` times the cost."""
+        """Sets the factor of the cost of merging regions that do not touch."""
         self.apart = factor
         self.cost = np.stack([self.costs(i) for i in range(len(self.area))])
 
     def costs(self, i: int) -> Floats:
-        """Cost [N] of merging `i` with each other region."""
+        """Cost float64 [N] of merging region `i` with each other one; infinite where impossible."""
         away = ((self.features - self.features[i]) ** 2).sum(1)
         size = self.area * self.area[i] / (self.area + self.area[i]) / self.area.sum()
         edge = self.edge[i] / np.maximum(self.shared[i], 1)
         cost = size**SIZE_POWER * away * (1 + EDGE * edge)
-        # Mumford-Shah: a long border between small regions is worth removing.
+        # As in the functional of Mumford and Shah, a long border between small regions is dear.
         length = self.shared[i] / np.sqrt(np.minimum(self.area, self.area[i]))
         cost *= np.where(length > 0, np.maximum(length, 0.1) ** -BORDER, self.apart)
         cost[~(self.alive & self.alive[i]) | (np.arange(len(cost)) == i)] = np.inf
         return np.asarray(cost)
 
     def merge(self, i: int, j: int) -> None:
-        """Put region `j` into region `i`."""
+        """Merges region `j` into region `i`."""
         share = self.area[[i, j]] / self.area[[i, j]].sum()
         self.features[i] = share @ self.features[[i, j]]
         self.area[i] += self.area[j]
@@ -205,7 +240,11 @@ class _Merger:
         self.cost[j] = self.cost[:, j] = np.inf
 
     def run(self, max_layers: int) -> Labels:
-        """Merge until every pair of at most `max_layers` regions is distinct; groups [N] from 0."""
+        """Merges until at most `max_layers` regions are left and all of them are distinct.
+
+        Returns:
+            int [N] number, from 0, of the merged region that each region belongs to.
+        """
         while self.alive.sum() > max(24, 2 * max_layers):
             self.merge(*divmod(int(self.cost.argmin()), len(self.cost)))
         self.allow_apart(APART)
@@ -221,7 +260,7 @@ class _Merger:
 
 
 def _spread(labels: Labels) -> Labels:
-    """Give pixels without a label that of the nearest pixel with one."""
+    """Gives each pixel with label -1 the label of the nearest pixel that has one."""
     missing = labels < 0
     _, nearest = cv2.distanceTransformWithLabels(
         missing.astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
@@ -232,7 +271,16 @@ def _spread(labels: Labels) -> Labels:
 
 
 def _refined(labels: Labels, rgb: NDArray[np.uint8], support: Mask) -> Labels:
-    """Bring labels to full size with smooth borders that follow the picture's edges."""
+    """Enlarges labels to the size of the picture, with smooth borders that follow its edges.
+
+    Args:
+        labels: int [h, w] labels from 0.
+        rgb: uint8 [H, W, 3] picture.
+        support: bool [H, W] pixels whose colours count.
+
+    Returns:
+        int [H, W] labels.
+    """
     height, width = rgb.shape[:2]
     count = int(labels.max()) + 1
     if count == 1:
