@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from proxyimg_codec.encoder.shapes.contours import fit_paths, outline_of
-from proxyimg_codec.encoder.shapes.paths import Bools, Floats, Ints, faults
+from .contours import fit_paths, outline_of
+from .paths import Bools, Floats, Ints, faults
 
 if TYPE_CHECKING:
     import torch

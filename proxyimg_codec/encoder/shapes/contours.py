@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from proxyimg_codec.encoder.shapes.paths import (
+from .paths import (
     Bools,
     Floats,
     Ints,

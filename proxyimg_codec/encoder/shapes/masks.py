@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from proxyimg_codec.errors import InputError
+from ...errors import InputError
 
 MAX_LABELS = 64
 _BACK_NAMES = ("back", "background")

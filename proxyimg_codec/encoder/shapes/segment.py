@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from proxyimg_codec.encoder.shapes.masks import Region, description, nearness, unique_names
+from .masks import Region, description, nearness, unique_names
 
 Floats = NDArray[np.float64]
 Image = NDArray[np.float32]
