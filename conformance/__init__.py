@@ -1,1 +1,1 @@
-"""The conformance suite of the `.pxi` format: cases, their generator, and a runner for decoders."""
+"""Conformance suite of the `.pxi` format: cases, their generator, and a runner for decoders."""

@@ -1,4 +1,4 @@
-"""The cases on disk: one folder each, described by its `case.json`."""
+"""Cases on disk: each is a folder with an input and its description, `case.json`."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ EXIT_CODES = {"invalid": 4, "unsupported": 5, "limit": 6}
 """Exit code of a decoder for each class of error."""
 
 PROFILES = ("still", "posed", "moving")
-"""Profiles of decoders; each can do what those before it can."""
+"""Profiles of decoders; each includes those before it."""
 
 LEVELS = 1, 2, 3
-"""Levels of decoders, likewise."""
+"""Levels of decoders; each includes those before it."""
 
 
 @dataclass(frozen=True)
 class Render:
-    """One picture that a decoder must be able to make of a case's input.
+    """Picture that a decoder must be able to render from the input of a case.
 
     Attributes:
         args: Arguments of `Image.render` that ask for it, with ``time`` for `t`.
-        flags: Command-line flags that do.
-        expected: PNG file of the pixels.
-        peak: Largest error of a sample that is allowed, in 8-bit levels.
-        rms: Largest root mean square error, likewise.
+        flags: Command-line flags that ask for it.
+        expected: PNG file of the expected pixels.
+        peak: Largest allowed error of a sample, in 8-bit levels.
+        rms: Largest allowed root mean square error, in 8-bit levels.
     """
 
     args: Mapping[str, Any]
@@ -43,20 +43,20 @@ class Render:
 
 @dataclass(frozen=True)
 class Case:
-    """One input and what a decoder must do with it.
+    """Input, and what a decoder must do with it.
 
     Attributes:
         name: Name of the folder.
-        title: One sentence.
-        tests: Ids of the statements of the specification that it is there for.
+        title: Description, one sentence.
+        tests: Ids of the statements of the specification that it tests.
         input: The `.pxi` file.
-        renders: Pictures to make, if the file is valid or may be read all the same.
-        error: Class of error, one of `EXIT_CODES`, if it must be refused.
+        renders: Pictures to render, if the file is valid, or if refusing it is optional.
+        error: Class of error, one of `EXIT_CODES`, if the file must be refused.
         latents: SHA-256 of the latents of its planes, in hexadecimal, if it has any.
-        profile: The lowest of `PROFILES` whose decoders it is for.
+        profile: The lowest of `PROFILES` whose decoders must pass it.
         level: The lowest of `LEVELS` whose decoders must read it; None if it must be refused.
-        optional: Whether a decoder need not look at what is wrong with the file.
-        kind: Name of the folder that it lies in; empty if cases lie in no such folders.
+        optional: Whether a decoder may ignore the fault of the file, and render it.
+        kind: Name of the folder that contains its folder; empty if cases are not grouped.
     """
 
     name: str
@@ -73,11 +73,11 @@ class Case:
 
     @property
     def outcome(self) -> str:
-        """What it is: ``valid``, a class of error, or a class that is ``optional``."""
+        """Expected outcome: ``valid`` or a class of error, perhaps followed by ``, optional``."""
         return f"{self.error or 'valid'}{', optional' if self.optional else ''}"
 
     def concerns(self, profile: str, level: int) -> bool:
-        """Whether it is for decoders of a profile and level."""
+        """Whether decoders of a profile and level must pass it."""
         capable = PROFILES.index(self.profile) <= PROFILES.index(profile)
         return capable and (self.level or LEVELS[0]) <= level
 
@@ -88,16 +88,16 @@ def load(
     profile: str = PROFILES[-1],
     level: int = LEVELS[-1],
 ) -> list[Case]:
-    """The cases under `folder`, or in folders of it, by name.
+    """Loads the cases under a folder, sorted by name.
 
     Args:
-        folder: Where they are.
-        pattern: Which names they have, as in a shell.
-        profile: Of the decoder that they are for.
-        level: Of this decoder.
+        folder: Folder of the cases, or of folders of cases.
+        pattern: Pattern of their names, as in a shell.
+        profile: Profile of the decoder to test.
+        level: Level of the decoder to test.
 
     Raises:
-        ValueError: A `case.json` makes no sense, or two cases have one name.
+        ValueError: A `case.json` is inconsistent, or two cases have the same name.
     """
     places = sorted((f.parent for f in folder.rglob("case.json")), key=lambda place: place.name)
     for one, other in pairwise(places):
@@ -108,12 +108,17 @@ def load(
 
 
 def find(name: str) -> Case:
-    """The case of this name."""
+    """Case with a name.
+
+    Raises:
+        ValueError: There is no such case.
+    """
     (case,) = load(pattern=name)
     return case
 
 
 def _read(place: Path, folder: Path) -> Case:
+    """Reads the case in the folder `place`."""
     file = place / "case.json"
     values = json.loads(file.read_text(encoding="utf-8"))
     renders = [
@@ -131,7 +136,7 @@ def _read(place: Path, folder: Path) -> Case:
         raise ValueError(f"{file}: {error} is not a class of error")
     if bool(renders) == (error is not None and not optional):
         raise ValueError(f"{file}: needs either renders or a class of error, or is optional")
-    # The root mean square cannot exceed the largest error: such a limit would test nothing.
+    # The root mean square never exceeds the largest error, so that such a limit would test nothing.
     if not all(0 < r.rms <= r.peak for r in renders):
         raise ValueError(f"{file}: the tolerance of the mean error exceeds that of the largest")
     profile, level = values["profile"], values.get("level")

@@ -1,4 +1,4 @@
-"""Whether a decoder did with a case what it must."""
+"""Judgement of a decoder: compares what it did with what a case demands."""
 
 from __future__ import annotations
 
@@ -18,31 +18,36 @@ from .cases import EXIT_CODES, Case, Render
 
 @dataclass(frozen=True)
 class Ended:
-    """How a run of a decoder ended: its exit code, None if it was stopped, and what it said."""
+    """End of a run of a decoder.
+
+    Attributes:
+        code: Exit code; None if the run was stopped.
+        message: Last part of its output.
+    """
 
     code: int | None
     message: str = ""
 
 
 Decoder = Callable[[Path, Path, Sequence[str]], Ended]
-"""Called with the input, where the picture goes, and flags."""
+"""Function from the input, the file for the picture, and flags."""
 
 Digester = Callable[[Path], Ended]
-"""Called with the input; its message is the SHA-256 of the latents, in hexadecimal."""
+"""Function from the input; its message is the SHA-256 of the latents, in hexadecimal."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """The verdict on one run.
+    """Result of one run of a decoder.
 
     Attributes:
         case: Name of the case.
-        render: Which of its renders, from 0.
-        problem: Empty if it passed, else ``timeout``, ``exit``, ``output``, ``size``, ``latents``
-            or ``pixels``, a colon and the details.
+        render: Number of the render in the case, from 0.
+        problem: Empty if the decoder passed; otherwise ``timeout``, ``exit``, ``output``, ``size``,
+            ``latents`` or ``pixels``, a colon and the details.
         peak: Largest error in 8-bit levels, or None if nothing was compared.
-        rms: Root mean square error, likewise.
-        seconds: How long the decoder ran.
+        rms: Root mean square error in 8-bit levels, or None if nothing was compared.
+        seconds: Duration of the run.
     """
 
     case: str
@@ -54,7 +59,7 @@ class Result:
 
     @property
     def passed(self) -> bool:
-        """Whether nothing was wrong."""
+        """Whether the decoder passed."""
         return not self.problem
 
 
@@ -65,15 +70,15 @@ def judge(
     suffix: str = ".png",
     digester: Digester | None = None,
 ) -> Result:
-    """Runs `decoder` on render `number` of a case, or on an input that must be refused.
+    """Runs a decoder on one render of a case, or on an input that must be refused.
 
     Args:
         case: The case.
-        number: Position in `case.renders`; 0 if the case has none. One that is optional has one,
-            which a decoder may make that does not refuse it.
-        decoder: What is tested.
-        suffix: Of the output: ``.png`` or ``.npy``.
-        digester: Hashes latents, which is tested too, with the first render of a case.
+        number: Position in `case.renders`; 0 if the case has none. An optional case has one render,
+            for decoders that do not refuse the file.
+        decoder: The decoder to test.
+        suffix: Suffix of its output: ``.png`` or ``.npy``.
+        digester: Function that hashes latents; it is tested with the first render of a case.
     """
     render = case.renders[number] if case.renders else None
     with tempfile.TemporaryDirectory(prefix="pxi-conformance-") as folder:
@@ -94,6 +99,7 @@ def judge(
 
 
 def _ending(ended: Ended, wanted: int) -> str:
+    """Compares the end of a run with the exit code `wanted`; returns the problem, or nothing."""
     said = (ended.message.strip().splitlines() or ["no message"])[-1][:200]
     if ended.code is None:
         return f"timeout: {said}"
@@ -105,6 +111,7 @@ def _ending(ended: Ended, wanted: int) -> str:
 
 
 def _hash(ended: Ended, wanted: str) -> str:
+    """Compares a hash of latents with `wanted`; returns the problem, or nothing."""
     found = ended.message.strip()
     if ended.code == 0 and found != wanted:
         return f"latents: the hash is {found[:64] or 'missing'} instead of {wanted}"
@@ -112,7 +119,7 @@ def _hash(ended: Ended, wanted: str) -> str:
 
 
 def _compare(output: Path, render: Render) -> tuple[str, float | None, float | None]:
-    """Problem, peak and RMS of a decoder's picture."""
+    """Compares the picture of a decoder with a render; returns problem, peak and RMS error."""
     expected = pixels.read(render.expected.read_bytes())
     try:
         got = pixels.read(output.read_bytes())
@@ -126,7 +133,7 @@ def _compare(output: Path, render: Render) -> tuple[str, float | None, float | N
     if not np.isfinite(got).all():
         return "pixels: not all are finite numbers", None, None
     peak, rms = difference(got, expected)
-    # Written so that a NaN could not pass.
+    # The condition is negated so that NaN fails.
     if not (peak <= render.peak and rms <= render.rms):
         allowed = f"{render.peak:g} and {render.rms:g}"
         return f"pixels: peak {peak:.3f} and RMS {rms:.3f} exceed {allowed}", peak, rms
@@ -134,17 +141,26 @@ def _compare(output: Path, render: Render) -> tuple[str, float | None, float | N
 
 
 def difference(a: NDArray[Any], b: NDArray[Any]) -> tuple[float, float]:
-    """Peak and RMS difference of two pictures [H, W, 3 or 4] of finite samples in 8-bit levels."""
+    """Difference of two pictures, premultiplied.
+
+    Args:
+        a: [H, W, 3 or 4] finite samples; integers of the full range of their type, or floats in
+            0..1.
+        b: The other picture, of the same width and height.
+
+    Returns:
+        Peak and root mean square of the error, in 8-bit levels.
+    """
     error = np.abs(_levels(a) - _levels(b))
     peak = float(error.max())
-    # Of errors that are all alike, rounding may put the mean above the largest.
+    # If all errors are equal, rounding may put the root mean square above the peak.
     rms = float(np.sqrt(np.mean(error**2)))
     assert rms <= peak * (1 + 1e-12), "the mean error exceeds the largest"
     return peak, min(rms, peak)
 
 
 def _levels(picture: NDArray[Any]) -> NDArray[np.float64]:
-    """Premultiplied [H, W, 4] in 8-bit levels; without alpha a picture is opaque."""
+    """Premultiplied picture float64 [H, W, 4] in 8-bit levels; without alpha it is opaque."""
     top = 1.0 if picture.dtype.kind == "f" else float(np.iinfo(picture.dtype).max)
     values = np.ones((*picture.shape[:2], 4))
     values[..., : picture.shape[2]] = picture / top

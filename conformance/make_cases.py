@@ -1,4 +1,4 @@
-"""The name under which cases tell what made them: the same as ``python -m conformance.make``."""
+"""Former name of ``python -m conformance.make``, by which the descriptions of cases call it."""
 
 import sys
 

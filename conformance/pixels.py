@@ -1,4 +1,4 @@
-"""Reading what decoders write: PNG and NPY files, strictly, with numpy and zlib alone."""
+"""Reader of the PNG and NPY files that decoders write; strict, with numpy and zlib alone."""
 
 from __future__ import annotations
 
@@ -12,14 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 SAMPLES_MAX = 1 << 26
-"""Larger pictures are refused: no case is anywhere near."""
+"""Most samples of a picture; no case comes near it."""
 
 
 def read(data: bytes) -> NDArray[Any]:
-    """Pixels [H, W, 3 or 4], uint16 or float32, of a PNG or NPY file.
+    """Reads a PNG or NPY file.
+
+    Returns:
+        uint16 or float32 [H, W, 3 or 4] pixels.
 
     Raises:
-        ValueError: Damaged, or not of these types.
+        ValueError: The file is damaged, or not of these types.
     """
     if data[:8] == b"\x89PNG\r\n\x1a\n":
         return _read_png(data)
@@ -29,12 +32,14 @@ def read(data: bytes) -> NDArray[Any]:
 
 
 def _check_shape(shape: tuple[int, ...]) -> None:
+    """Checks that a shape is that of a picture [H, W, 3 or 4]."""
     whole = len(shape) == 3 and all(type(v) is int and v > 0 for v in shape)
     if not whole or shape[2] not in (3, 4) or math.prod(shape) > SAMPLES_MAX:
         raise ValueError(f"shape {shape} is not that of an RGB or RGBA picture")
 
 
 def _read_npy(data: bytes) -> NDArray[Any]:
+    """Reads an NPY file of uint16 or float32."""
     start, form = (12, "<I") if data[6:7] > b"\x01" else (10, "<H")
     if len(data) < start:
         raise ValueError("the NPY file is truncated")
@@ -55,6 +60,7 @@ def _read_npy(data: bytes) -> NDArray[Any]:
 
 
 def _read_png(data: bytes) -> NDArray[Any]:
+    """Reads a PNG file of 16-bit RGB or RGBA without interlacing."""
     chunks = _png_chunks(data)
     if not chunks or chunks[0][0] != b"IHDR" or len(chunks[0][1]) != 13:
         raise ValueError("the PNG file does not start with IHDR")
@@ -80,6 +86,7 @@ def _read_png(data: bytes) -> NDArray[Any]:
 
 
 def _png_chunks(data: bytes) -> list[tuple[bytes, bytes]]:
+    """Types and contents of the chunks of a PNG file."""
     chunks: list[tuple[bytes, bytes]] = []
     at = 8
     while at < len(data):
@@ -97,7 +104,14 @@ def _png_chunks(data: bytes) -> list[tuple[bytes, bytes]]:
 def _unfilter(
     kind: int, line: NDArray[np.uint8], above: NDArray[np.uint8], step: int
 ) -> NDArray[np.uint8]:
-    """One row of bytes without its PNG filter; `step` is the number of bytes a pixel."""
+    """Undoes the PNG filter of a row.
+
+    Args:
+        kind: Number of the filter.
+        line: uint8 [stride] filtered bytes.
+        above: uint8 [stride] bytes of the row above.
+        step: Bytes a pixel.
+    """
     if kind == 0:
         return line
     if kind == 2:
@@ -114,5 +128,6 @@ def _unfilter(
 
 
 def _paeth(a: int, b: int, c: int) -> int:
+    """Paeth predictor of the PNG specification."""
     p = a + b - c
     return min((abs(p - a), 0, a), (abs(p - b), 1, b), (abs(p - c), 2, c))[2]

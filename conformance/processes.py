@@ -1,4 +1,4 @@
-"""Running a decoder command as a process with caps on time and memory."""
+"""Decoder commands, run as processes with limits on time and memory."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .judge import Decoder, Digester, Ended
 _FILE_BYTES = 1 << 28
 _MESSAGE_BYTES = 2000
 
-# Caps data rather than address space, of which some runtimes reserve much more than they use.
+# Data is limited rather than address space: some runtimes reserve much more of that than they use.
 _LIMITED = """
 import os, resource, sys
 def cap(what, value):
@@ -35,7 +35,13 @@ except OSError as error:
 
 
 def expand(template: str, source: Path, target: Path, flags: Sequence[str]) -> list[str]:
-    """The words of a command with ``{in}``, ``{out}`` and ``{args}`` filled in.
+    """Words of a command, with ``{in}``, ``{out}`` and ``{args}`` filled in.
+
+    Args:
+        template: The command, quoted as for a shell.
+        source: Path of the input.
+        target: Path of the output.
+        flags: Words in place of ``{args}``.
 
     Raises:
         ValueError: The template lacks one of the three, or its quotes do not match.
@@ -55,7 +61,7 @@ def expand(template: str, source: Path, target: Path, flags: Sequence[str]) -> l
 
 
 def command_decoder(template: str, timeout: float, memory: int) -> Decoder:
-    """A decoder that is a command.
+    """Creates a decoder that runs a command.
 
     Args:
         template: Words with ``{in}``, ``{out}`` and ``{args}``, quoted as for a shell.
@@ -70,7 +76,7 @@ def command_decoder(template: str, timeout: float, memory: int) -> Decoder:
 
 
 def command_digester(template: str, timeout: float, memory: int) -> Digester:
-    """A command that prints the hash of a file's latents.
+    """Creates a digester that runs a command, which prints the hash of the latents of a file.
 
     Args:
         template: Words with ``{in}``, quoted as for a shell.
@@ -86,7 +92,7 @@ def command_digester(template: str, timeout: float, memory: int) -> Digester:
 
 
 def _run(words: Sequence[str], timeout: float, memory: int, kept: str) -> Ended:
-    """How a command ends, and the end of its ``stdout`` or ``stderr``."""
+    """Runs a command; returns its end, with the last part of its ``stdout`` or ``stderr``."""
     limited = [sys.executable, "-ISc", _LIMITED, str(memory), str(_FILE_BYTES), *words]
     with tempfile.TemporaryFile() as said:
         outputs: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
@@ -105,6 +111,6 @@ def _run(words: Sequence[str], timeout: float, memory: int, kept: str) -> Ended:
 
 
 def _kill(process: subprocess.Popen[bytes]) -> None:
-    """Ends a process that still runs, and its children."""
+    """Kills a process that still runs, and its children."""
     os.killpg(process.pid, signal.SIGKILL)
     process.wait()

@@ -1,4 +1,4 @@
-"""Tests any decoder that is a command: ``python -m conformance.runner --decoder "CMD"``."""
+"""Test of any decoder that is a command: ``python -m conformance.runner --decoder "CMD"``."""
 
 from __future__ import annotations
 
@@ -30,7 +30,18 @@ def run(
     suffix: str = ".png",
     digester: Digester | None = None,
 ) -> list[Result]:
-    """The verdicts on every render of every case, in order."""
+    """Judges a decoder on every render of every case.
+
+    Args:
+        cases: The cases.
+        decoder: The decoder to test.
+        jobs: Number of runs at a time.
+        suffix: Suffix of its output: ``.png`` or ``.npy``.
+        digester: Function that hashes latents, if that is tested.
+
+    Returns:
+        The results, in the order of the cases and their renders.
+    """
     runs = [(case, i) for case in cases for i in range(max(len(case.renders), 1))]
     if jobs == 1:
         return [judge(case, i, decoder, suffix, digester) for case, i in runs]
@@ -39,7 +50,7 @@ def run(
 
 
 def table(results: Sequence[Result]) -> str:
-    """One line a run: case, result, peak, RMS, seconds, and what went wrong."""
+    """Formats results, one a line: case, result, peak, RMS, seconds, and the problem."""
     width = max(len(r.case) for r in results) + 3
     lines = [f"{'case':{width}} result    peak     rms  seconds"]
     for r in results:
@@ -52,7 +63,7 @@ def table(results: Sequence[Result]) -> str:
 
 
 def listing(cases: Sequence[Case]) -> str:
-    """One line a case: name, kind, profile, level, title, outcome, and ids of its statements."""
+    """Formats cases, one a line: name, kind, profile, level, title, outcome, and statements."""
     width = max(len(case.name) for case in cases)
     kinds = max(len("kind"), *(len(case.kind) for case in cases))
     lines = [f"{'case':{width}} {'kind':{kinds}} profile level  title"]
@@ -65,12 +76,12 @@ def listing(cases: Sequence[Case]) -> str:
 
 
 def failed_cases(results: Sequence[Result]) -> list[str]:
-    """Names of the cases of which at least one run failed."""
+    """Names of the cases for which at least one run failed."""
     return list(dict.fromkeys(r.case for r in results if not r.passed))
 
 
 def arguments() -> argparse.ArgumentParser:
-    """The command line."""
+    """Parser of the command line."""
     p = argparse.ArgumentParser("conformance.runner", description="Test a decoder of .pxi files.")
     add = p.add_argument
     add("--decoder", metavar="CMD",
@@ -94,7 +105,7 @@ def arguments() -> argparse.ArgumentParser:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point: 0 if all passed or were listed, 1 if anything failed."""
+    """Entry point; returns 0 if all cases passed or were listed, and 1 if any failed."""
     parser = arguments()
     args = parser.parse_args(argv)
     if args.jobs < 1 or args.timeout <= 0 or args.memory < 1:

@@ -1,4 +1,4 @@
-"""SHA-256 of the latents that a file's planes decode to: ``python -m conformance.symbols FILE``."""
+"""SHA-256 of the latents of a file's planes: ``python -m conformance.symbols FILE``."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from proxyimg_codec import errors, from_bytes
 
 
 def digest(data: bytes) -> str:
-    """Of a file as [PYR-29] of the specification says, in hexadecimal; empty without planes.
+    """SHA-256 of the latents of a file, in hexadecimal [PYR-29]; empty if it has no planes.
 
     Raises:
-        PxiError: The file is corrupt.
+        PxiError: The file cannot be read, or a stream is corrupt.
     """
     planes = from_bytes(data).planes
     hashed = hashlib.sha256()

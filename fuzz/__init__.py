@@ -1,1 +1,1 @@
-"""Fuzz targets: nothing that is read may raise anything but a `PxiError` (see README.md)."""
+"""Fuzz targets: no input may raise anything but a `PxiError` (see README.md)."""

@@ -40,37 +40,37 @@ Values = dict[str, Any]
 BOMBS: dict[str, Callable[[], bytes]] = {}
 
 SECONDS, BYTES = 300, 12 << 30
-"""What a measurement may take at most."""
+"""Most processor time in seconds, and most memory in bytes, that a measurement may take."""
 
 
 def bomb(build: Callable[[], bytes]) -> Callable[[], bytes]:
-    """Registers a file by the name of the function that makes it."""
+    """Registers a builder of a file under its own name."""
     BOMBS[build.__name__] = build
     return build
 
 
 def zeros(channels: int, rows: int, columns: int, bits: int = 4) -> bytes:
-    """A coded array of zeros, which soon cost next to nothing."""
+    """Coded array of zeros; the adaptive model soon codes each in next to no bits."""
     values = np.zeros((channels, rows, columns), np.int8)
     return arrays.encode(values, bits, np.ones((rows, columns), bool))
 
 
 def lonely(rows: int, columns: int) -> bytes:
-    """A coded array of bits of which only the first is set."""
+    """Coded array of bits of which only the first is set."""
     values = np.zeros((1, rows, columns), np.int8)
     values[0, 0, 0] = 1
     return arrays.encode(values, 1, np.ones((rows, columns), bool))
 
 
 def layer(number: int = 0, **values: Any) -> Values:
-    """A LAYR that covers the canvas."""
+    """Fields of a LAYR that covers the canvas."""
     plain = {"box": [0, 0, 256, 256], "sampling": 0, "unit": 0, "segments": [], "classes": b"",
              "deltas": b""}  # fmt: skip
     return {"name": str(number), **plain, **values}
 
 
 def outlined(number: int, count: int, size: int = 256) -> Values:
-    """A LAYR whose boundary has `count` segments that cross the canvas."""
+    """Fields of a LAYR whose boundary has `count` segments that cross the canvas."""
     points = np.zeros((count, 6), np.int64)
     points[0::2, ::2], points[1::2, ::2] = size // 3, -(size // 3)
     points[0::2, 1::2], points[1::2, 1::2] = size // 3, -(size // 3)
@@ -79,7 +79,7 @@ def outlined(number: int, count: int, size: int = 256) -> Values:
 
 
 def network(hidden: int = 4, depth: int = 1, dim: int = 1) -> Values:
-    """A NETW whose weights are as small as can be."""
+    """Fields of a NETW whose weights take as few bytes as possible."""
     sizes = [dim, *[hidden] * depth, 3]
     weights = b""
     for inputs, outputs in pairwise(sizes):
@@ -93,14 +93,14 @@ def network(hidden: int = 4, depth: int = 1, dim: int = 1) -> Values:
 
 
 def codes(columns: int = 2, rows: int = 2, data: bytes = b"", stored: bytes = b"") -> Values:
-    """A TEXR of codes."""
+    """Fields of a TEXR with codes."""
     data = data or zeros(1, rows, columns)
     return {"coder": 1, "network": 0, "grid": [columns, rows], "bits": 4, "steps": b"\0\x3c",
             "stored": stored, "codes": data}  # fmt: skip
 
 
 def plan(columns: int, rows: int, levels: int = 3, data: bytes = b"") -> Values:
-    """A PLAN whose latents are all certain, and cost nothing."""
+    """Fields of a PLAN whose latents are all certain, so that they take no bytes."""
     return {
         "model": 1, "size": [columns, rows], "components": 3, "step": 512, "levels": levels,
         "grey": 0, "lowest": [0, 0, 0], "shifts": [0, 0] * levels, "cell": 8, "support": b"",
@@ -109,7 +109,7 @@ def plan(columns: int, rows: int, levels: int = 3, data: bytes = b"") -> Values:
 
 
 def view(columns: int, rows: int, planes: int = 0, **values: Any) -> Values:
-    """A TEXR of planes."""
+    """Fields of a TEXR that shows planes."""
     plain = {"alpha": 0, "part": [0, 0, columns, rows], "cell": 0, "mask": b"", "cuts": []}
     return {"coder": 2, "planes": planes, **plain, **values}
 
@@ -118,14 +118,14 @@ def made(
     layers: Sequence[Values], textures: Sequence[Values], networks: Sequence[Values] = (),
     size: int = 256, **more: Any,
 ) -> bytes:  # fmt: skip
-    """A file."""
+    """Bytes of a file."""
     head = {"size": [size, size], "channels": 3, "opaque": 0, "depth": 8}
     head |= {"layers": len(layers), "networks": len(networks)}
     return file.serialize(Container(head, tuple(layers), tuple(networks), tuple(textures), **more))
 
 
 def meshed(base: Base, levels: int = 0, number: int = 0) -> Values:
-    """A MESH with all triangles split so often."""
+    """Fields of a MESH whose triangles are all split `levels` times."""
     mesh = Mesh.build(base)
     count = len(base.triangles)
     mesh = mesh.split([np.ones(count << 2 * k, bool) for k in range(levels)])
@@ -133,7 +133,7 @@ def meshed(base: Base, levels: int = 0, number: int = 0) -> Values:
 
 
 def grid(columns: int, rows: int) -> Base:
-    """A base of squares of two triangles each."""
+    """Base mesh of squares of two triangles each."""
     step = (256 * 1024 // 255 // 16 * 16,) * 2
     x, y = np.meshgrid(np.arange(columns + 1), np.arange(rows + 1))
     points = np.stack([x.ravel() * (255 // columns), y.ravel() * (255 // rows)], 1)
@@ -144,29 +144,29 @@ def grid(columns: int, rows: int) -> Base:
 
 
 def plain(**more: Any) -> bytes:
-    """A file of one small layer, and something else."""
+    """Bytes of a file of one small layer, and of other chunks."""
     return made([layer()], [codes()], [network()], **more)
 
 
-# What is read before anything is decoded.
+# Parts that are read before anything is decoded.
 
 
 @bomb
 def chunks() -> bytes:
-    """As many chunks as there may be."""
+    """File of as many chunks as are allowed."""
     return plain(extra=(Chunk("abCd", b""),) * ((1 << 16) - 5))
 
 
 @bomb
 def blocks() -> bytes:
-    """Three blocks of metadata, a history and a script."""
+    """Three metadata blocks that together hold almost 192 MiB when decompressed."""
     block = bytes((1 << 26) - 1)
     return plain(blocks={"icc": block, "exif": block, "xmp": block})
 
 
 @bomb
 def window() -> bytes:
-    """A block with as large a window as there may be."""
+    """Metadata blocks with as large a window as is allowed."""
     parameters = zstandard.ZstdCompressionParameters(window_log=27, compression_level=1)
     compressor = zstandard.ZstdCompressor(compression_params=parameters).compressobj()
     frame = compressor.compress(b"a") + compressor.flush()
@@ -175,6 +175,7 @@ def window() -> bytes:
 
 
 def _history(content: bytes) -> bytes:
+    """Bytes of a small file with a history."""
     chunks = file.present(file.parse(plain()))
     frame = zstandard.ZstdCompressor(level=9).compress(content)
     own = msgpack.packb([undo.digest(chunks), len(content), frame])
@@ -183,47 +184,47 @@ def _history(content: bytes) -> bytes:
 
 @bomb
 def history_arrays() -> bytes:
-    """A history of 60 million empty arrays."""
+    """History of 60 million empty arrays."""
     return _history(b"\x92\xdc\0\x3c" + (b"\xdd\0\x0f\xff\xff" + b"\x90" * 0xFFFFF) * 60 + b"\x90")
 
 
 @bomb
 def history_numbers() -> bytes:
-    """A history of 60 million numbers."""
+    """History of 60 million numbers."""
     return _history(b"\x92\x90\xdc\0\x3c" + (b"\x92\xa0\xdd\0\x0f\xff\xff" + b"\0" * 0xFFFFF) * 60)
 
 
 @bomb
 def history_states() -> bytes:
-    """As many references to chunks as there may be."""
+    """History with as many references to chunks as are allowed."""
     steps = [["", [0] * 256] for _ in range(4096)]
     return _history(msgpack.packb([[], steps]))
 
 
 @bomb
 def history_chunks() -> bytes:
-    """A history of large chunks, all of which must be parsed to go back."""
+    """History of large chunks, all of which must be parsed to go back."""
     kept = [["TEXR", msgpack.packb([1, bytes(1000)])] for _ in range(60000)]
     return _history(msgpack.packb([kept, [["", [7]]]]))
 
 
 @bomb
 def arrays_in_payload() -> bytes:
-    """A chunk of a megabyte of empty arrays."""
+    """Chunk of a megabyte of empty arrays."""
     payload = b"\x93" + (b"\xdd\0\x05\0\0" + b"\x90" * 0x50000) * 3
     return plain(extra=(Chunk("tREE", payload),))
 
 
 @bomb
 def numbers_in_payload() -> bytes:
-    """Chunks of many numbers."""
+    """Chunk of many numbers."""
     more = msgpack.packb(["", "", [300] * 330_000])
     return plain(extra=(Chunk("iNFO", more),))
 
 
 @bomb
 def tree() -> bytes:
-    """A chain of groups."""
+    """Chain of groups, each in the next."""
     count = 100_000
     names = [f"{k:x}g" for k in range(count)]
     parents = [2, *range(3, count + 2), 0]
@@ -235,19 +236,19 @@ def tree() -> bytes:
 
 @bomb
 def segments() -> bytes:
-    """One boundary of as many segments as there may be."""
+    """One boundary of as many segments as are allowed."""
     return made([outlined(0, (1 << 16) - 2)], [codes()], [network()])
 
 
 @bomb
 def long_segments() -> bytes:
-    """The same on a huge canvas."""
+    """One boundary of as many segments on a huge canvas."""
     return made([outlined(0, 1 << 16, 1 << 20)], [codes()], [network()], size=1 << 20)
 
 
 @bomb
 def layers() -> bytes:
-    """As many layers as there may be, with as many segments each."""
+    """As many layers as are allowed, which together have as many segments as are allowed."""
     return made(
         [outlined(k, 64) for k in range(1024)],
         [codes(), *[{"coder": 0, "texture": 0}] * 1023],
@@ -257,7 +258,7 @@ def layers() -> bytes:
 
 @bomb
 def gates() -> bytes:
-    """A mesh whose gates are open all at once, and are closed with vertices of high rank."""
+    """Mesh whose gates are all open at once, and are closed with vertices of high rank."""
     count, total = 10_500, 1 << 15
     border = Border(count)
     symbols, places = [NEW] * 3, [(100, 100), (10, 0), (0, 10)]
@@ -270,7 +271,7 @@ def gates() -> bytes:
             break
         expected = border.predicted((a, b), near)
         if border.known < count:
-            # On the far side of the gate from what is near it.
+            # A new vertex must lie on the far side of the gate, seen from `near`.
             (ax, ay), (bx, by) = border.at(a), border.at(b)
             some = rng.integers(0, 256, (200, 2)).tolist()
             good = [p for p in some if (ax - bx) * (p[1] - by) > (ay - by) * (p[0] - bx)]
@@ -292,10 +293,12 @@ def gates() -> bytes:
 
 
 def _wrap(value: int) -> int:
+    """Residual of a coordinate, modulo 256, in -128..127."""
     return (value + 128) % 256 - 128
 
 
 def _connected(symbols: list[int], places: list[tuple[int, int]]) -> bytes:
+    """Bytes of a file with a mesh of given symbols and residuals."""
     classes, raw = deltas.encode(np.array(places, np.int64).T)
     stored = np.ones((1, len(symbols)), bool)
     mesh = {
@@ -307,7 +310,7 @@ def _connected(symbols: list[int], places: list[tuple[int, int]]) -> bytes:
 
 
 def bent(number: int, nodes: int) -> Values:
-    """A POSE that displaces the first of some nodes."""
+    """Fields of a POSE that displaces the first of `nodes` nodes."""
     values = np.zeros((2, 1, nodes), np.int64)
     values[0, 0, 0] = 16
     classes, raw = deltas.encode(values)
@@ -319,19 +322,20 @@ def bent(number: int, nodes: int) -> Values:
 
 
 def _nodes(values: Mapping[str, Any]) -> int:
+    """Number of nodes of a mesh."""
     return len(Mesh({k: v for k, v in values.items() if k != "layer"}).refined.nodes)
 
 
 @bomb
 def gate_grid() -> bytes:
-    """A mesh of as many gates as there may be."""
+    """Mesh of as many gates as are allowed."""
     mesh = meshed(grid(127, 127))
     return made([layer()], [codes()], [network()], meshes=(mesh,), poses=(bent(0, _nodes(mesh)),))
 
 
 @bomb
 def faces() -> bytes:
-    """A mesh of as many faces as there may be."""
+    """Mesh of as many faces as are allowed."""
     mesh = meshed(grid(16, 24), 4)
     return made([layer()], [codes()], [network()], meshes=(mesh,), poses=(bent(0, _nodes(mesh)),))
 
@@ -350,7 +354,7 @@ def meshes() -> bytes:
 
 @bomb
 def riders() -> bytes:
-    """A boundary of many pieces on a mesh of many faces."""
+    """Boundary of many pieces on a mesh of many faces."""
     mesh = meshed(grid(16, 16), 3)
     return made(
         [outlined(0, 1 << 12, 4096)], [codes()], [network()], size=4096, meshes=(mesh,),
@@ -359,6 +363,7 @@ def riders() -> bytes:
 
 
 def _motion(coefficients: int, modes: int, mesh: Values) -> Values:
+    """Fields of an mOTN whose numbers are all 0."""
     return {
         "duration": 1000, "fps": 24, "loop": 1, "intervals": coefficients, "unit": 0,
         "layers": [0], "bodies": [0], "modes": modes, "size": 0, "script": b"",
@@ -368,18 +373,19 @@ def _motion(coefficients: int, modes: int, mesh: Values) -> Values:
 
 
 def _moving(coefficients: int, modes: int, mesh: Values) -> bytes:
+    """Bytes of a file with a motion."""
     return plain(meshes=(mesh,), motion=_motion(coefficients, modes, mesh))
 
 
 @bomb
 def curves() -> bytes:
-    """As long curves as there may be."""
+    """Curves as long as are allowed."""
     return _moving(65_500, 63, meshed(grid(1, 1)))
 
 
 @bomb
 def shapes() -> bytes:
-    """As many shapes of as many nodes as there may be."""
+    """As many shapes of as many nodes as are allowed."""
     mesh = meshed(grid(15, 16), 3)
     return _moving(1, 60, mesh)
 
@@ -389,14 +395,14 @@ def shapes() -> bytes:
 
 @bomb
 def parameters() -> bytes:
-    """One network of as many parameters as there may be."""
+    """One network of as many parameters as are allowed."""
     net = network(1024, 4)
     return made([layer()], [codes()], [net])
 
 
 @bomb
 def wide_network() -> bytes:
-    """A network of a quarter of a million multiplications a sample, on many layers."""
+    """Network of a quarter of a million multiplications a sample, on many layers."""
     return made(
         [layer(k, box=[0, 0, 256, 256]) for k in range(256)],
         [codes(), *[{"coder": 0, "texture": 0}] * 255], [network(512, 2)],
@@ -411,13 +417,13 @@ def networks() -> bytes:
 
 @bomb
 def one_plane_of_codes() -> bytes:
-    """A plane of as many codes as there may be."""
+    """Plane of as many codes as are allowed."""
     return made([layer()], [codes(4096, 2048)], [network()])
 
 
 @bomb
 def columns_of_codes() -> bytes:
-    """Planes of codes that are high and narrow: many wavefronts."""
+    """Planes of codes that are high and narrow, which have many wavefronts."""
     data = codes(2, 32_760)
     count = 2
     return made([layer(k) for k in range(count)], [data] * count, [network()])
@@ -425,21 +431,21 @@ def columns_of_codes() -> bytes:
 
 @bomb
 def holes() -> bytes:
-    """A plane of codes of which one is stored: all others are filled."""
+    """Plane of codes of which one is stored, so that all others are filled."""
     mask, one = lonely(2048, 4096), zeros(1, 1, 1)
     return made([layer()], [codes(4096, 2048, one, mask)], [network()])
 
 
 @bomb
 def mask() -> bytes:
-    """A mask of as many cells as there may be."""
+    """Mask of as many cells as are allowed."""
     masked = view(4096, 2048, mask=lonely(2048, 4096))
     return made([layer()], [masked], planes=(plan(4096, 4096),))
 
 
 @bomb
 def masks() -> bytes:
-    """Narrow masks: many wavefronts."""
+    """Narrow masks, which have many wavefronts."""
     coded = lonely(16_000, 2)
     count = 2
     return made(
@@ -450,13 +456,13 @@ def masks() -> bytes:
 
 @bomb
 def samples() -> bytes:
-    """A raster of as many samples as there may be."""
+    """Raster of as many samples as are allowed."""
     return made([layer()], [view(4096, 4096)], planes=(plan(4096, 4096),))
 
 
 @bomb
 def rasters() -> bytes:
-    """Rasters of one sample each, with as many levels as there may be."""
+    """Rasters of one sample each, with as many levels as are allowed."""
     data = planes.encoded(
         Latents(tuple(np.zeros((9, 1 << k, 1 << k), np.int32) for k in range(7, -1, -1)),
                        np.zeros((3, 1, 1), np.int32)), (1, 1), 512, cell=8,
@@ -470,7 +476,7 @@ def rasters() -> bytes:
 
 @bomb
 def latents() -> bytes:
-    """A megabyte of random latents."""
+    """Raster of random latents, in a megabyte."""
     words = np.random.default_rng(1).integers(0, 1 << 16, 480_000).astype("<u2").tobytes()
     data = b"\0" + (1 << 17).to_bytes(4, "little") + (480_000).to_bytes(4, "little") + words
     own = plan(2048, 2048, 3, data) | {"lowest": [30] * 3, "shifts": [15] * 6, "step": 0}
@@ -479,7 +485,7 @@ def latents() -> bytes:
 
 @bomb
 def cuts() -> bytes:
-    """A view that many boundaries cut."""
+    """View that many boundaries cut."""
     side, count = 2048, 400
     box = [0, 0, side, side]
     back = view(side, side, cuts=list(range(1, count)))
@@ -491,7 +497,7 @@ def cuts() -> bytes:
 
 @bomb
 def together() -> bytes:
-    """Most of what there may be, at once."""
+    """Most of the above at once."""
     mesh, (columns, rows) = meshed(grid(16, 24), 4), (4096, 2048)
     holes = codes(columns, rows, zeros(1, 1, 1), lonely(rows, columns))
     return made(
@@ -502,7 +508,7 @@ def together() -> bytes:
 
 
 def opened(data: bytes) -> None:
-    """Opens a file, with all that is decoded, short of planes."""
+    """Opens a file and decodes everything but planes."""
     image = from_bytes(data)
     for own in image.layers:
         if own.mesh is not None:
@@ -512,7 +518,7 @@ def opened(data: bytes) -> None:
 
 
 def drawn(data: bytes) -> None:
-    """Draws 256 pixels, across or down."""
+    """Draws a file at 256 pixels for its longer side."""
     image = from_bytes(data)
     size = {"width": 256} if image.width >= image.height else {"height": 256}
     image.render(**size)  # type: ignore[arg-type]  # width or height
@@ -522,7 +528,7 @@ STAGES = {"open": opened, "check": lambda data: bool(validate.validate(data)), "
 
 
 def _stage(name: str, path: str) -> None:
-    """Runs a stage in a process of its own, and prints what it took."""
+    """Runs a stage, and prints the time and memory that it took."""
     resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
     resource.setrlimit(resource.RLIMIT_AS, (BYTES, BYTES))
     data = Path(path).read_bytes()
@@ -540,12 +546,17 @@ def _stage(name: str, path: str) -> None:
 
 
 def measure(name: str, numpy_only: bool) -> None:
-    """Prints a line for each stage of a file."""
+    """Measures all stages of a file, and prints a line for each.
+
+    Args:
+        name: Name of the file, a key of `BOMBS`.
+        numpy_only: Whether to run without the compiled kernel.
+    """
     import os
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "bomb.pxi"
-        # Not here: a process begins with the peak of the one that started it.
+        # The file is made in another process: this one would hand down its peak of memory.
         code = f"from fuzz.bombs import BOMBS; open({str(path)!r}, 'wb').write(BOMBS[{name!r}]())"
         subprocess.run([sys.executable, "-c", code], check=True)
         size = path.stat().st_size

@@ -1,4 +1,7 @@
-"""Parsing: any bytes are a container, or a `PxiError`; a container is written and read again."""
+"""Fuzz target of the parser: bytes are a container or raise a `PxiError`.
+
+What is parsed is written and must be read again alike.
+"""
 
 from __future__ import annotations
 
@@ -10,11 +13,11 @@ with run.imports(__name__):
     from proxyimg_codec.limits import Limits
 
 LIMITS = Limits(chunks=256, metadata_bytes=1 << 14, references=1 << 10)
-"""Small enough that no input takes long."""
+"""Limits that are so low that no input takes long."""
 
 
 def one_input(data: bytes) -> None:
-    """Parses a file, and what is written of it."""
+    """Parses a file, and the file that is written from it."""
     try:
         found = file.parse(data, LIMITS)
     except PxiError:

@@ -1,6 +1,6 @@
-"""Decoding: what is valid is drawn, and saved as a file that draws alike; all else is refused.
+"""Fuzz target of the decoder: valid files are drawn and saved, others are refused.
 
-`pxi-validate` has to say the same of a file as the decoder does.
+A saved file must draw alike. `pxi-validate` must agree with the decoder on whether a file is valid.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ LIMITS = Limits(
     wavefronts=1024, motion=1 << 12, parameters=1 << 14, metadata_bytes=1 << 14,
     references=1 << 10, output_pixels=1 << 14,
 )  # fmt: skip
-"""Small enough that no input takes long."""
+"""Limits that are so low that no input takes long."""
 
 logging.disable()
 
 SIDE = 24
-"""Pixels drawn, across and down."""
+"""Largest width and height that are drawn, in pixels."""
 
 
 def drawn(image: Image, **options: Any) -> Any:
-    """A small picture of it, or None if it exceeds the limits."""
+    """Draws an image at a small size; None if that exceeds the limits."""
     width, height = min(image.width, SIDE), min(image.height, SIDE)
     try:
         return image.render(width=width, height=height, limits=LIMITS, **options)
@@ -48,7 +48,7 @@ def drawn(image: Image, **options: Any) -> Any:
 
 def one_input(data: bytes) -> None:
     """Decodes a file in all ways."""
-    # Some of them without the kernel; a warning of numpy is something that was not foreseen.
+    # One in eight runs without the kernel. A warning of numpy counts as a failure.
     way = run.numpy_only() if zlib.crc32(data) % 8 == 0 else contextlib.nullcontext()
     with way, warnings.catch_warnings(), np.errstate(all="warn", under="ignore"):
         warnings.simplefilter("error")
@@ -56,6 +56,7 @@ def one_input(data: bytes) -> None:
 
 
 def _decode(data: bytes) -> None:
+    """Validates, decodes, draws and saves a file, and compares the results."""
     wrong = [v for v in validate.validate(data, LIMITS) if v.severity == ERROR]
     try:
         image = from_bytes(data, LIMITS)
@@ -82,6 +83,7 @@ def _decode(data: bytes) -> None:
 
 
 def _salvage(data: bytes) -> None:
+    """Decodes a damaged file as far as possible."""
     with contextlib.suppress(PxiError):
         drawn(from_bytes(data, LIMITS, tolerant=True))
 

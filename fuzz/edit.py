@@ -1,6 +1,7 @@
-"""Editing: a sequence of edits gives a picture that is saved, read and drawn alike.
+"""Fuzz target of edits: a picture after a sequence of edits is saved, read and drawn alike.
 
-An input is a byte for the picture, and bytes that operations and their parameters are made of.
+The first byte of an input chooses the picture; operations and their parameters are made from the
+others.
 """
 
 from __future__ import annotations
@@ -24,16 +25,16 @@ PICTURES = (
     "layers", "bent-turned", "posed", "alpha", "pyramid-cuts", "pyramid-cuts-several", "tree",
     "pyramid-alpha", "moves-layers", "undo", "node-bent", "shared", "colours", "pyramid-support",
 )  # fmt: skip
-"""Cases of the conformance suite that are edited; those that do not exist are left out."""
+"""Cases of the conformance suite to edit; names without a case are left out."""
 
 STEPS = 6
-"""Edits in a sequence at most."""
+"""Most edits in a sequence."""
 
 SIDE = 20
 
 
 class Source:
-    """Takes values from bytes; zeros when there are no more."""
+    """Source of values that are made from bytes; zeros follow when the bytes are used up."""
 
     def __init__(self, data: bytes) -> None:
         self._data, self._at = data, 0
@@ -42,17 +43,17 @@ class Source:
         return self._at < len(self._data)
 
     def take(self, count: int) -> bytes:
-        """The next `count` bytes."""
+        """Next `count` bytes."""
         found = self._data[self._at : self._at + count]
         self._at += count
         return found.ljust(count, b"\0")
 
     def below(self, end: int) -> int:
-        """An integer in 0..end - 1."""
+        """Next integer in 0..end - 1."""
         return self.take(1)[0] % end
 
     def number(self) -> float:
-        """A number, most often one that makes sense."""
+        """Next number, usually one of a sensible size."""
         kind = self.below(8)
         if kind == 7:
             return float(struct.unpack("<d", self.take(8))[0])
@@ -60,7 +61,7 @@ class Source:
         return value / (1, 4, 64, 256, 4096, 1 << 14, 1 << 15)[kind]
 
     def value(self, kind: str, names: list[str]) -> Any:
-        """A parameter of a kind."""
+        """Next value of a kind of parameter, sometimes of a wrong type."""
         unusual = self.below(32)
         if unusual == 31:
             return (None, [], {}, "", "\ud800", -1, 1 << 80, [["a"]])[self.below(8)]
@@ -88,27 +89,27 @@ class Source:
 
 @cache
 def pictures() -> list[Image]:
-    """What is edited."""
+    """Pictures to edit."""
     cases = run.ROOT / "conformance" / "cases"
     paths = (path for name in PICTURES for path in cases.glob(f"*/{name}/input.pxi"))
     return [from_bytes(path.read_bytes()) for path in paths]
 
 
 def operation(source: Source, image: Image) -> dict[str, Any]:
-    """An edit of a picture."""
+    """Makes an edit of a picture."""
     names = [layer.name for layer in image.layers] + list(image.groups)
     name = list(OPERATIONS)[source.below(len(OPERATIONS))]
     out: dict[str, Any] = {"op": name}
     for key, parameter in OPERATIONS[name].parameters.items():
         if parameter.needed or source.below(2):
             out[key] = source.value(parameter.kind, names)
-    if "source" in out:  # never a file
+    if "source" in out:  # a layer, so that no file is read
         out["source"] = names[source.below(len(names))]
     return out
 
 
 def drawn(image: Image) -> Any:
-    """A small picture of it, or what is wrong."""
+    """Draws an image at a small size; the error message if that fails."""
     try:
         return image.render(width=min(image.width, SIDE), height=min(image.height, SIDE))
     except PxiError as error:
@@ -116,7 +117,7 @@ def drawn(image: Image) -> Any:
 
 
 def one_input(data: bytes) -> None:
-    """Edits a picture, saves and reads it, and takes the edits back."""
+    """Edits a picture, saves and reads it, and undoes the edits."""
     source = Source(data)
     image = first = pictures()[source.below(len(pictures()))]
     done = 0
@@ -137,7 +138,7 @@ def one_input(data: bytes) -> None:
 
 
 def seeds() -> list[bytes]:
-    """Some sequences."""
+    """Random sequences of bytes."""
     rng = np.random.default_rng(1)
     return [bytes(rng.integers(0, 256, n, np.uint8)) for n in range(8, 136, 2)]
 

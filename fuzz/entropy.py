@@ -1,7 +1,7 @@
-"""Entropy coding: streams decode alike with and without the kernel, or end in a `FormatError`.
+"""Fuzz target of the entropy coder: streams decode alike with and without the kernel.
 
-An input is a byte for what is coded, six for its shape, two for where the first of two streams
-ends, and the streams.
+Corrupt streams must raise a `FormatError` in both cases. The first byte of an input chooses what is
+coded, six bytes its shape, and two the end of the first of two streams; the streams follow.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ HEAD = 9
 
 
 def _shape(head: bytes) -> tuple[tuple[int, int, int], int, Any]:
-    """Shape of an array, bits a value, and which positions are stored."""
+    """Shape of an array, its bits a value, and bool [rows, columns] of the stored positions."""
     shape = (1 + head[1] % 4, 1 + head[2] % 24, 1 + head[3] % 24)
     stored = np.ones(shape[1:], bool)
     if head[5]:
@@ -34,12 +34,13 @@ def _shape(head: bytes) -> tuple[tuple[int, int, int], int, Any]:
 
 
 def _array(head: bytes, first: bytes, second: bytes) -> Any:
+    """Decodes a coded array."""
     shape, bits, stored = _shape(head)
     return arrays.decode(first + second, shape, bits, stored)
 
 
 def _again(head: bytes, first: bytes, second: bytes) -> Any:
-    """Any values, coded and decoded."""
+    """Encodes an array of arbitrary values, and decodes it."""
     shape, bits, stored = _shape(head)
     values = np.resize(np.frombuffer(first + second + b"\0", np.uint8), shape) & ((1 << bits) - 1)
     found = arrays.decode(arrays.encode(values, bits, stored), shape, bits, stored)
@@ -48,6 +49,7 @@ def _again(head: bytes, first: bytes, second: bytes) -> Any:
 
 
 def _deltas(head: bytes, first: bytes, second: bytes) -> Any:
+    """Decodes signed integers; other streams must not decode to the same."""
     found = deltas.decode(first, second, 1 + head[1] % 6, 1 + head[2], "", 1 + head[3] % 3)
     parts = found.reshape(len(found), 1 + head[3] % 3, -1)
     assert deltas.encode(parts) == (first, second), "other streams have the same meaning"
@@ -55,6 +57,7 @@ def _deltas(head: bytes, first: bytes, second: bytes) -> Any:
 
 
 def _planes(head: bytes, first: bytes, second: bytes) -> Any:
+    """Decodes the latents of planes."""
     levels, components = 1 + head[3] % 4, (1, 3)[head[3] >> 7]
     fields = {
         "model": 1, "size": [1 + head[1] % 40, 1 + head[2] % 40], "components": components,
@@ -71,7 +74,10 @@ KINDS = (_array, _again, _deltas, _planes)
 
 
 def _tried(kind: Callable[[bytes, bytes, bytes], Any], *given: bytes) -> Any:
-    """What it gives, or None; which rule is found broken first does not matter."""
+    """Calls `kind`; returns None if it raises a `FormatError`.
+
+    It does not matter which broken rule is found first.
+    """
     try:
         return kind(*given)
     except FormatError:
@@ -79,7 +85,7 @@ def _tried(kind: Callable[[bytes, bytes, bytes], Any], *given: bytes) -> Any:
 
 
 def one_input(data: bytes) -> None:
-    """Decodes with the kernel, and with numpy."""
+    """Decodes streams with the kernel and with numpy, and compares the results."""
     if len(data) < HEAD:
         return
     head, rest = data[:HEAD], data[HEAD:]
@@ -93,7 +99,7 @@ def one_input(data: bytes) -> None:
 
 
 def seeds() -> list[bytes]:
-    """Streams of each kind."""
+    """Valid streams of each kind."""
     rng = np.random.default_rng(1)
     out = [b"\1" + bytes(rng.integers(0, 256, 60, np.uint8))]
 

@@ -1,7 +1,7 @@
-"""A mutator that knows the container: it changes what chunks hold, and keeps the frames right.
+"""Mutator that knows the container: it changes the content of chunks and keeps the framing valid.
 
-Without it hardly any input would pass the CRCs. It changes one value of one chunk in most cases,
-in the compressed blocks too, and sometimes chunks as a whole, or bytes anywhere.
+Without it hardly any input would pass the CRCs. In most cases it changes one value of one chunk,
+which may lie in a compressed block; sometimes it changes chunks as a whole, or arbitrary bytes.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import msgpack
 import zstandard
 
 PREFIX = 12
-"""Bytes before the first chunk."""
+"""Number of bytes before the first chunk."""
 
 Chunks = list[tuple[bytes, bytes]]
 Mutate = Callable[[bytes, int], bytes]
@@ -31,7 +31,7 @@ _TYPES = (b"HEAD", b"LAYR", b"MESH", b"POSE", b"NETW", b"PLAN", b"TEXR", b"iCCp"
 
 
 def split(data: bytes) -> Chunks:
-    """Types and payloads of the chunks of a file, as far as there are whole ones."""
+    """Types and payloads of the chunks of a file, up to the first that is incomplete."""
     chunks: Chunks = []
     at = PREFIX
     while at + 12 <= len(data):
@@ -44,7 +44,7 @@ def split(data: bytes) -> Chunks:
 
 
 def join(prefix: bytes, chunks: Chunks) -> bytes:
-    """The file of some chunks, with the right CRCs."""
+    """Bytes of a file of some chunks, with valid CRCs."""
     parts = [prefix]
     for type_, payload in chunks:
         body = type_ + struct.pack("<I", len(payload)) + payload
@@ -53,11 +53,12 @@ def join(prefix: bytes, chunks: Chunks) -> bytes:
 
 
 class Mutator:
-    """Mutates `.pxi` files.
+    """Mutator of `.pxi` files.
 
     Args:
         seeds: Files whose chunks are also put into others.
-        mutate: Mutates plain bytes: (bytes, largest size) -> bytes, `atheris.Mutate`.
+        mutate: Function that mutates arbitrary bytes: (bytes, largest size) -> bytes;
+            `atheris.Mutate`.
     """
 
     def __init__(self, seeds: list[bytes], mutate: Mutate) -> None:
@@ -66,7 +67,7 @@ class Mutator:
         self._rng = random.Random(0)
 
     def __call__(self, data: bytes, max_size: int, seed: int) -> bytes:
-        """A changed `data`, of at most `max_size` bytes."""
+        """Mutated `data`, of at most `max_size` bytes."""
         rng = self._rng
         rng.seed(seed)
         chunks = split(data)
@@ -85,7 +86,7 @@ class Mutator:
         return out if len(out) <= max_size else data
 
     def _shuffle(self, chunks: Chunks, k: int) -> None:
-        """Changes which chunks there are around number k."""
+        """Removes, repeats, inserts or replaces chunks at position `k`."""
         rng = self._rng
         match rng.randrange(5):
             case 0 if len(chunks) > 1:
@@ -101,7 +102,7 @@ class Mutator:
                 chunks[k] = rng.choice(_TYPES), chunks[k][1]
 
     def _consistent(self, prefix: bytes, chunks: Chunks) -> Chunks:
-        """With numbers in HEAD and a hash in uNDO that are right, most often."""
+        """Corrects the numbers in HEAD and the hash in uNDO, in most cases."""
         if self._rng.random() < 0.9 and chunks[0][0] == b"HEAD":
             head = _unpacked(chunks[0][1])
             if isinstance(head, list) and len(head) == 6:
@@ -119,13 +120,14 @@ class Mutator:
         return chunks
 
     def _payload(self, payload: bytes) -> bytes:
+        """Payload with one value changed."""
         content = _unpacked(payload)
         if content is None:
             return self._mutate(payload, len(payload) + 64)
         return _packed(self._value(content)) or payload
 
     def _value(self, value: Any) -> Any:
-        """A value of msgpack, changed somewhere."""
+        """MessagePack value, changed in one place."""
         rng = self._rng
         if rng.random() < 0.02:
             return rng.choice((0, -1, "", b"", [], {}, None, True, 1.5, [[]], 1 << 40))
@@ -141,6 +143,7 @@ class Mutator:
         return self._int(value) if isinstance(value, int) else value
 
     def _list(self, value: list[Any]) -> list[Any]:
+        """List with one item changed, added, repeated or removed."""
         rng = self._rng
         if not value or rng.random() < 0.08:
             k = rng.randrange(len(value) + 1)
@@ -155,6 +158,7 @@ class Mutator:
         return [*value[:k], self._value(value[k]), *value[k + 1 :]]
 
     def _bytes(self, value: bytes) -> bytes:
+        """Bytes changed; a Zstandard frame is changed in its content."""
         rng = self._rng
         if value[:4] != _ZSTD or rng.random() < 0.2:
             return self._mutate(value, len(value) + 64) if value or rng.random() < 0.5 else b"\0"
@@ -170,6 +174,7 @@ class Mutator:
         return zstandard.ZstdCompressor(level=1).compress(block)
 
     def _int(self, value: int) -> int:
+        """Integer near to another one, or an extreme one."""
         rng = self._rng
         match rng.randrange(5):
             case 0:
@@ -186,6 +191,7 @@ class Mutator:
 
 
 def _unpacked(payload: bytes) -> Any:
+    """Content of MessagePack bytes; None if they are none."""
     try:
         return msgpack.unpackb(payload, raw=False)
     except (ValueError, TypeError, RecursionError, msgpack.UnpackException):
@@ -193,6 +199,7 @@ def _unpacked(payload: bytes) -> Any:
 
 
 def _packed(content: Any) -> bytes:
+    """MessagePack bytes of a value; empty if it has none."""
     try:
         packed: bytes = msgpack.packb(content, use_bin_type=True)
     except (ValueError, OverflowError, TypeError, RecursionError):

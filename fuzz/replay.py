@@ -1,4 +1,4 @@
-"""Runs the targets on their seeds, their corpus, and more files, without fuzzing.
+"""Runs the targets on their seeds, their corpus and other files, without fuzzing.
 
 python -m fuzz.replay [FILE ...]
 """
@@ -12,7 +12,7 @@ from fuzz import container, decode, edit, entropy, run
 
 
 def main() -> None:
-    """Runs everything; what a target finds is raised."""
+    """Runs all targets; an error that a target finds is raised."""
     more = [Path(p).read_bytes() for p in sys.argv[1:]]
     first = {
         "container": run.seeds(),

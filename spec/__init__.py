@@ -1,1 +1,1 @@
-"""Tools that keep the specification of the `.pxi` format and the code in step."""
+"""Tools that keep the specification of the `.pxi` format consistent with the code."""

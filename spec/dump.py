@@ -27,17 +27,17 @@ from proxyimg_codec.texture.planes import Planes
 from proxyimg_codec.texture.pyramid import PyramidTexture, Texture
 
 Piece = tuple[int, str]
-"""A number of bytes and what they mean."""
+"""Number of bytes, and their meaning."""
 
 LINE = 16
-"""Bytes a line."""
+"""Bytes in a line."""
 
 LINES = 16
-"""Lines of one piece that are shown; the rest is counted."""
+"""Most lines of one piece that are printed; the bytes after them are counted."""
 
 
 def coded_array(data: bytes) -> Iterator[Piece]:
-    """Pieces of a coded array."""
+    """Yields the pieces of a coded array."""
     lanes = 1 << data[0]
     words = int.from_bytes(data[1 + 4 * lanes : 5 + 4 * lanes], "little")
     yield 1, f"rANS stream with 2^{data[0]} lanes"
@@ -51,14 +51,14 @@ def coded_array(data: bytes) -> Iterator[Piece]:
 
 
 def halves(data: bytes) -> Iterator[Piece]:
-    """Pieces of an array of float16."""
+    """Yields the pieces of an array of float16."""
     for at in range(0, len(data), LINE):
         part = data[at : at + LINE]
         yield len(part), " ".join(f"{v:g}" for v in struct.unpack(f"<{len(part) // 2}e", part))
 
 
 def arrays(data: bytes) -> Iterator[Piece]:
-    """Pieces of coded arrays that each stand after their length."""
+    """Yields the pieces of coded arrays, each of which follows its length."""
     at = 0
     while at < len(data):
         size = int.from_bytes(data[at : at + 4], "little")
@@ -68,7 +68,7 @@ def arrays(data: bytes) -> Iterator[Piece]:
 
 
 def blob(meaning: str) -> Callable[[bytes], Iterator[Piece]]:
-    """A function that makes one piece of all bytes."""
+    """Function that makes one piece of all bytes."""
     return lambda data: iter([(len(data), meaning)])
 
 
@@ -98,11 +98,11 @@ BINARY: dict[str, Callable[[bytes], Iterator[Piece]]] = {
     "state": blob("SHA-256"),
     "zstd": blob("Zstandard frame"),
 }
-"""What is inside the binary fields."""
+"""Functions that divide the bytes of binary fields into pieces, by the name of the field."""
 
 
 def valid(chunk: chunks.Chunk) -> bool:
-    """Whether a chunk is a structured one and has the values that it must have."""
+    """Whether a chunk has fields, and valid values in all of them."""
     try:
         fields = fields_of(chunk)
         unpack(fields, chunk.payload, "", old=chunk.old)
@@ -112,7 +112,7 @@ def valid(chunk: chunks.Chunk) -> bool:
 
 
 def structured(payload: bytes, keys: Sequence[str]) -> Iterator[Piece]:
-    """Pieces of a MessagePack array of values that are called `keys`, or of a map."""
+    """Yields the pieces of a payload: a MessagePack array of the values of `keys`, or a map."""
     unpacker = msgpack.Unpacker()
     unpacker.feed(payload)
     in_map = payload[0] < 0x90
@@ -139,7 +139,7 @@ def structured(payload: bytes, keys: Sequence[str]) -> Iterator[Piece]:
 
 
 def pieces(data: bytes) -> Iterator[Piece]:
-    """Pieces of a whole file.
+    """Yields the pieces of a whole file.
 
     Raises:
         PxiError: The framing is damaged.
@@ -160,7 +160,11 @@ def pieces(data: bytes) -> Iterator[Piece]:
 
 
 def dump(data: bytes) -> Iterator[str]:
-    """Lines of offset, bytes and meaning."""
+    """Yields lines of offset, bytes and meaning.
+
+    Raises:
+        PxiError: The framing is damaged.
+    """
     at = 0
     for size, meaning in pieces(data):
         if not size:
@@ -174,7 +178,12 @@ def dump(data: bytes) -> Iterator[str]:
 
 
 def grid(values: np.ndarray, shown: np.ndarray | None = None) -> Iterator[str]:
-    """Lines of a matrix of integers; a dot where `shown` is false."""
+    """Yields the lines of a matrix of integers.
+
+    Args:
+        values: int [rows, columns].
+        shown: bool [rows, columns]; a dot is printed where it is false. None for all true.
+    """
     cells = [
         [str(v) if shown is None or shown[y, x] else "." for x, v in enumerate(row)]
         for y, row in enumerate(values)
@@ -185,13 +194,18 @@ def grid(values: np.ndarray, shown: np.ndarray | None = None) -> Iterator[str]:
 
 
 def points(pairs: np.ndarray, a_line: int = 8) -> Iterator[str]:
-    """Lines of tuples of integers [N, k]."""
+    """Yields the lines of tuples of integers.
+
+    Args:
+        pairs: int [N, k].
+        a_line: Tuples in a line.
+    """
     for at in range(0, len(pairs), a_line):
         yield "  " + " ".join(str(tuple(p)) for p in pairs[at : at + a_line].tolist())
 
 
 def mesh_values(name: str, refined: Refined) -> Iterator[str]:
-    """Lines of nodes and faces."""
+    """Yields the lines of the nodes and faces of a layer."""
     yield f"layer {name!r}, {len(refined.nodes)} nodes in 1/1024 pixel"
     yield from points(refined.nodes)
     yield f"layer {name!r}, {len(refined.faces)} faces"
@@ -199,7 +213,7 @@ def mesh_values(name: str, refined: Refined) -> Iterator[str]:
 
 
 def pose_values(name: str, pose: Pose) -> Iterator[str]:
-    """Lines of a pose that is not at rest."""
+    """Yields the lines of the pose of a layer that is not at rest."""
     yield f"layer {name!r}, pose"
     yield f"  matrix {list(pose.matrix)} shift {list(pose.shift)}"
     yield f"  opacity {pose.opacity} hidden {int(pose.hidden)}"
@@ -212,7 +226,7 @@ def pose_values(name: str, pose: Pose) -> Iterator[str]:
 
 
 def track_values(name: str, track: Track) -> Iterator[str]:
-    """Lines of the curves and shapes of a layer that moves."""
+    """Yields the lines of the curves and shapes of a layer that moves."""
     yield f"layer {name!r}, body {track.body}, coefficients of curves in 1/256"
     yield from grid(track.curves)
     for k, shape in enumerate(track.shapes):
@@ -221,7 +235,7 @@ def track_values(name: str, track: Track) -> Iterator[str]:
 
 
 def shape_values(name: str, outline: Boundary, width: int, height: int) -> Iterator[str]:
-    """Lines of the outline of a layer and its coverage of the canvas."""
+    """Yields the lines of the outline of a layer, and of its coverage of the canvas."""
     for k, path in enumerate(outline.paths):
         yield f"layer {name!r}, control points of path {k}"
         yield "  " + " ".join(f"({x}, {y})" for x, y in path)
@@ -235,7 +249,7 @@ def shape_values(name: str, outline: Boundary, width: int, height: int) -> Itera
 
 
 def planes_values(number: int, planes: Planes) -> Iterator[str]:
-    """Lines of latents."""
+    """Yields the lines of the latents of planes."""
     levels, lowest = planes.latents
     for colour in range(planes.components):
         yield f"planes {number}, lowest plane of colour {colour}"
@@ -248,7 +262,7 @@ def planes_values(number: int, planes: Planes) -> Iterator[str]:
 
 
 def texture_values(name: str, texture: Texture) -> Iterator[str]:
-    """Lines of stored and filled codes, or of the mask of a view."""
+    """Yields the lines of stored and filled codes, or of the samples that a view shows."""
     if isinstance(texture, PyramidTexture):
         if texture.shown is not None:
             yield f"layer {name!r}, samples that show"
@@ -264,7 +278,7 @@ def texture_values(name: str, texture: Texture) -> Iterator[str]:
 
 
 def values(image: Image) -> Iterator[str]:
-    """Lines of the integers that a small file decodes to."""
+    """Yields the lines of all integers that a small file decodes to."""
     for i, network in enumerate(image.networks):
         for k, weights in enumerate(network.weights):
             yield f"network {i}, weights of linear layer {k}"

@@ -1,4 +1,4 @@
-"""The generated parts of chapter 8: the registered models, tables, a worked example."""
+"""Generated parts of chapter 8: the registered models, tables, a worked example."""
 
 from __future__ import annotations
 
@@ -21,17 +21,18 @@ Ints = NDArray[np.int64]
 
 _LOW = np.array([[[-9, 4, 60], [2, 3, -1]], [[3, 1, 0], [0, 2, 0]], [[-2, 0, 0], [0, 0, 1]]])
 _HIGH = {0: [[3, 0, -1], [0, 2, 0]], 1: [[0, -70, 0], [0, 0, 1]], 4: [[0, 0, 1], [0, 0, 0]]}
-"""Latents of the worked example: the lowest planes, and channels of level 1."""
+"""Latents of the worked example: the lowest planes, and level 1 by channel."""
 
 
 def scales() -> Iterator[str]:
-    """Lines of Python with the constants of the distributions."""
+    """Yields lines of Python with the constants of the distributions."""
     last = laplace.DIRECT + 1
     yield from _listed("DECAY", [laplace.decay(k) for k in range(last + laplace._HEAVIER)])
     yield from _listed("REACHES", [laplace.reach_of(k) for k in range(last)])
 
 
 def _listed(name: str, values: list[int], a_line: int = 8) -> Iterator[str]:
+    """Yields the lines of a Python list."""
     yield f"{name} = ["
     for at in range(0, len(values), a_line):
         yield "    " + " ".join(f"{v}," for v in values[at : at + a_line])
@@ -39,11 +40,12 @@ def _listed(name: str, values: list[int], a_line: int = 8) -> Iterator[str]:
 
 
 def _file(number: int) -> bytes:
+    """Bytes of the file of a registered model."""
     return resources.files("proxyimg_codec.models").joinpath(f"pyramid-{number}.bin").read_bytes()
 
 
 def models() -> Iterator[str]:
-    """Rows of the table of registered models."""
+    """Yields the rows of the table of registered models."""
     yield "| Number | File | Bytes | H | C |"
     yield "|---|---|---|---|---|"
     for number in registered_model.REGISTERED:
@@ -53,7 +55,7 @@ def models() -> Iterator[str]:
 
 
 def registered() -> Iterator[str]:
-    """Lines of Python with the SHA-256 of each model."""
+    """Yields lines of Python with the SHA-256 of each model."""
     yield "REGISTERED = {"
     for number, digest in registered_model.REGISTERED.items():
         yield f'    {number}: "{digest}",'
@@ -61,10 +63,10 @@ def registered() -> Iterator[str]:
 
 
 def layout() -> Iterator[str]:
-    """Rows of the table of arrays in a model file, with the exponents of the newest model."""
+    """Yields the rows of the table of arrays in a model file; exponents are those of the newest."""
     number = max(registered_model.REGISTERED)
     found = registered_model.registered(number)
-    h, c = 10007, 10009  # stand for any widths
+    h, c = 10007, 10009  # unusual widths, so that they are recognized in the shapes
     letters = {h: "H", c: "C"}
     head = ", ".join(str(k) for k in range(1, registered_model.LEVEL_SETS))
     yield f"| Array | Type | Shape | e in model {number}: levels {head}, and above |"
@@ -83,7 +85,7 @@ def layout() -> Iterator[str]:
 
 
 def _example() -> planes.Planes:
-    """The planes of the worked example."""
+    """Planes of the worked example."""
     level = np.zeros((9, 2, 3), np.int32)
     for channel, values in _HIGH.items():
         level[channel] = values
@@ -92,11 +94,12 @@ def _example() -> planes.Planes:
 
 
 def _cells() -> NDArray[np.bool_]:
+    """Cells of the worked example that have latents."""
     return np.array([[True, True, True], [True, True, False]])
 
 
 def example() -> Iterator[str]:
-    """Lines of the worked example: fields, latents, samples."""
+    """Yields the lines of the worked example: fields, latents, samples."""
     shown = _example()
     for key, value in shown.packed.items():
         yield f"{key:10} {value.hex(' ') if isinstance(value, bytes) else value}"
@@ -113,7 +116,7 @@ def example() -> Iterator[str]:
 
 
 def steps() -> Iterator[str]:
-    """Rows of the table of the symbols of the worked example."""
+    """Yields the rows of the table of symbols of the worked example."""
     yield "| Set | Mean | Scale | s' | Part | Centre | Raw bits | Symbol | Latent |"
     yield "|---|---|---|---|---|---|---|---|---|"
     sets: list[tuple[Ints, Ints, Ints]] = []

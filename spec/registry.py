@@ -1,4 +1,4 @@
-"""The registry of numbers and names, as tables of chapters and as JSON."""
+"""Registry of numbers and names, as tables for the chapters and as JSON."""
 
 from __future__ import annotations
 
@@ -45,14 +45,14 @@ CHUNKS = {
     undo.TYPE: "history",
     "TAIL": "end of the file",
 }
-"""What each chunk of the format is for, in the order of a file."""
+"""Purpose of each chunk of the format, in the order of a file."""
 
 CLASSES: dict[str, type[errors.PxiError]] = {
     "invalid": errors.FormatError,
     "unsupported": errors.UnsupportedError,
     "limit": errors.LimitError,
 }
-"""Classes of errors."""
+"""Classes of errors by name."""
 
 SAMPLINGS = {
     0: "direct",
@@ -65,13 +65,13 @@ CODERS = {texr.SHARED: "shared", texr.IMPLICIT: "implicit", texr.PYRAMID: "pyram
 
 
 def _numbers() -> dict[str, dict[int, str]]:
-    """Fields whose numbers may grow, with their meanings."""
+    """Fields whose numbers later versions may add to, with the meanings of the numbers."""
     models = {number: f"pyramid-{number}.bin" for number in registered_model.REGISTERED}
     return {"coder of TEXR": CODERS, "sampling of LAYR": SAMPLINGS, "model of PLAN": models}
 
 
 def chunks_table() -> Iterator[str]:
-    """Rows of the table of chunk types."""
+    """Yields the rows of the table of chunk types."""
     yield "| Type | Holds | A reader that does not know it | A program that changes the file |"
     yield "|---|---|---|---|"
     for type_, meaning in CHUNKS.items():
@@ -82,7 +82,7 @@ def chunks_table() -> Iterator[str]:
 
 
 def numbers_table() -> Iterator[str]:
-    """Rows of the table of numbers."""
+    """Yields the rows of the table of numbers."""
     yield "| Field | Number | Meaning |"
     yield "|---|---|---|"
     for field, known in _numbers().items():
@@ -92,7 +92,7 @@ def numbers_table() -> Iterator[str]:
 
 
 def levels_table() -> Iterator[str]:
-    """Rows of the table of levels."""
+    """Yields the rows of the table of levels."""
     yield "| Limit | " + " | ".join(f"Level {k}" for k, _ in enumerate(levels.LEVELS, 1)) + " |"
     yield "|---|" + "---|" * len(levels.LEVELS)
     for name in levels.COUNTED:
@@ -101,11 +101,11 @@ def levels_table() -> Iterator[str]:
 
 
 def as_json(fields: Mapping[str, Sequence[Field]], ids: Sequence[str]) -> str:
-    """The registry.
+    """Text of `registry.json`.
 
     Args:
-        fields: Those of each chunk and coder, as the chapters name them.
-        ids: Of all statements.
+        fields: Fields of each chunk and coder, by the name that the chapters use.
+        ids: Ids of all statements.
     """
     content: dict[str, Any] = {
         "version": ".".join(map(str, chunks.VERSION)),

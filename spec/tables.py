@@ -60,15 +60,15 @@ FIELDS = {
 }
 
 KEYS = ("HEAD", "LAYR", "MESH", "POSE", "NETW", "PLAN", "mOTN")
-"""Chunks that the program of the chapters reads, besides TEXR."""
+"""Chunks besides TEXR that the program in the chapters reads."""
 
 SMALL = np.array([[[20, 21, 22, 0], [20, 21, 20, 23]]])
 SMALL_STORED = np.array([[True, True, True, False], [True, True, True, True]])
 SMALL_BITS = 5
-"""The worked example of the entropy coder."""
+"""Worked example of the entropy coder: values, stored positions, bits a value."""
 
 SIGNED = (0, -1, 3, -6, 20000)
-"""The worked example of signed integers."""
+"""Worked example of signed integers."""
 
 MESH = meshes.Mesh.build(
     meshes.Base(
@@ -77,11 +77,11 @@ MESH = meshes.Mesh.build(
         np.array([(0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)], np.int32),
     )
 ).split([np.array([True, False, False, False])])  # fmt: skip
-"""The worked example of a mesh."""
+"""Worked example of a mesh."""
 
 
 def number(value: int) -> str:
-    """An integer, as a power of two where that is shorter."""
+    """Formats an integer, as a power of two if that is shorter."""
     size = abs(value)
     for offset, suffix in ((0, ""), (1, " - 1")):
         if size > 1 << 12 and (size + offset).bit_count() == 1:
@@ -91,7 +91,7 @@ def number(value: int) -> str:
 
 
 def fields_table(fields: tuple[Field, ...]) -> Iterator[str]:
-    """Lines of the table of a chunk."""
+    """Yields the lines of the table of fields of a chunk."""
     yield "| Key | Type | Range | Meaning |"
     yield "|---|---|---|---|"
     for f in fields:
@@ -106,7 +106,7 @@ def fields_table(fields: tuple[Field, ...]) -> Iterator[str]:
 
 
 def keys_table() -> Iterator[str]:
-    """The keys of the chunks that the program of the chapters reads, as Python."""
+    """Yields lines of Python with the keys of the chunks that the program in the chapters reads."""
     yield "KEYS = {"
     for kind in KEYS:
         yield f'    "{kind}": "{" ".join(f.key for f in FIELDS[kind])}",'
@@ -118,7 +118,7 @@ def keys_table() -> Iterator[str]:
 
 
 def small_example() -> Iterator[str]:
-    """Lines of the worked example of the entropy coder."""
+    """Yields the lines of the worked example of the entropy coder."""
     for name, row, kept in zip(("values", "      "), SMALL[0], SMALL_STORED, strict=True):
         cells = (str(v) if k else "." for v, k in zip(row, kept, strict=True))
         yield f"{name}  " + " ".join(c.rjust(2) for c in cells)
@@ -126,7 +126,7 @@ def small_example() -> Iterator[str]:
 
 
 def signed_example() -> Iterator[str]:
-    """Lines of the worked example of signed integers."""
+    """Yields the lines of the worked example of signed integers."""
     classes, raw = deltas.encode(np.array([SIGNED]))
     sizes = [min(abs(v).bit_length(), 15) for v in SIGNED]
     bits = "".join(f"{byte:08b}" for byte in raw)
@@ -143,7 +143,7 @@ def signed_example() -> Iterator[str]:
 
 
 def boundary_example() -> Iterator[str]:
-    """Lines of the worked example of a boundary."""
+    """Yields the lines of the worked example of a boundary."""
     fields = parse(EXAMPLE.read_bytes()).layers[1]
     count = sum(fields["segments"])
     rows = deltas.decode(fields["classes"], fields["deltas"], 6, count, "")
@@ -161,12 +161,12 @@ def boundary_example() -> Iterator[str]:
 
 
 def plain(row: object) -> str:
-    """A row of integers as (1, 2)."""
+    """Formats a row of integers as (1, 2)."""
     return str(tuple(np.asarray(row).tolist()))
 
 
 def mesh_example() -> Iterator[str]:
-    """Lines of the worked example of a mesh."""
+    """Yields the lines of the worked example of a mesh."""
     fields, base, refined = MESH.fields, MESH.base, MESH.refined
     residuals = deltas.decode(fields["classes"], fields["deltas"], 2, fields["vertices"], "")
     yield "origin     " + plain(fields["origin"]) + "  step " + plain(fields["step"])
@@ -183,14 +183,14 @@ def mesh_example() -> Iterator[str]:
 
 
 def mesh_symbols() -> list[int]:
-    """The symbols of the worked example of a mesh."""
+    """Symbols of the worked example of a mesh."""
     count = MESH.fields["gates"]
     coded = arrays.decode(MESH.fields["symbols"], (1, 1, count), 4, np.ones((1, count), bool))
     return [int(v) for v in coded.ravel()]
 
 
 def mesh_steps() -> Iterator[str]:
-    """Rows of the table of how the gates of that mesh are decoded."""
+    """Yields the rows of the table that shows how the gates of that mesh are decoded."""
     yield "| Gate | Near | Expected | Ranked | Symbol | Triangle |"
     yield "|---|---|---|---|---|---|"
     border = Border(len(MESH.base.vertices))
@@ -211,13 +211,13 @@ def mesh_steps() -> Iterator[str]:
 
 
 def pixels() -> Iterator[str]:
-    """Rows of the example picture in hexadecimal."""
+    """Yields the rows of the example picture in hexadecimal."""
     for row in from_bytes(EXAMPLE.read_bytes()).render(engine="numpy"):
         yield " ".join(bytes(p).hex() for p in row)
 
 
 def fenced(lines: Iterator[str], language: str = "text") -> Iterator[str]:
-    """Lines as a block."""
+    """Yields lines as a fenced code block."""
     yield f"```{language}"
     yield from lines
     yield "```"
@@ -244,39 +244,40 @@ PARTS: dict[str, Callable[[], Iterator[str]]] = {
     "values": lambda: fenced(values(from_bytes(EXAMPLE.read_bytes()))),
     "pixels": lambda: fenced(pixels()),
 }
-"""Every generated part by name."""
+"""Functions that generate the parts, by the name of the part."""
 
 _PART = re.compile(r"^<!-- ([^\n]+) -->\n(.*?)^<!-- end -->\n", re.M | re.S)
 
 
 def chapters() -> list[Path]:
-    """The files of the specification: README, then the chapters by number."""
+    """Files of the specification: README, then the chapters by number."""
     return [FOLDER / "README.md", *sorted(FOLDER.glob("[0-9]*.md"), key=_number)]
 
 
 def _number(chapter: Path) -> int:
+    """Number of a chapter."""
     return int(chapter.name.partition("-")[0])
 
 
 def shown() -> dict[str, str]:
-    """Every generated part as it stands in the chapters."""
+    """Generated parts as they stand in the chapters, by name."""
     return {m[1]: m[2] for path in chapters() for m in _PART.finditer(path.read_text("utf-8"))}
 
 
 def wanted(name: str) -> str:
-    """A generated part as the code makes it."""
+    """Generated part as the code makes it."""
     return "".join(f"{line}\n" for line in PARTS[name]())
 
 
 def registry_text() -> str:
-    """`registry.json` as the code makes it; the ids are those of the chapters."""
+    """Text of `registry.json` as the code makes it, with the ids in the chapters."""
     text = "".join(path.read_text("utf-8") for path in chapters())
     ids = re.findall(r"^\*\*\[([A-Z]{3}-\d+)\]\*\* ", text, re.M)
     return registry.as_json(FIELDS, ids)
 
 
 def write() -> None:
-    """Renews all generated parts."""
+    """Renews all generated parts and `registry.json`."""
     for path in chapters():
         text = path.read_text("utf-8")
         new = _PART.sub(lambda m: f"<!-- {m[1]} -->\n{wanted(m[1])}<!-- end -->\n", text)

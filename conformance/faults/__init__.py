@@ -1,1 +1,1 @@
-"""Decoders with one fault each, which the suite must catch."""
+"""Decoders with one fault each, which the suite must detect."""

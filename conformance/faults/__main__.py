@@ -1,4 +1,4 @@
-"""A wrong decoder: ``python -m conformance.faults --fault NAME IN OUT [flags of pxi-decode]``."""
+"""Decoder with a fault: ``python -m conformance.faults --fault NAME IN OUT [pxi-decode flags]``."""
 
 import sys
 

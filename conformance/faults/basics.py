@@ -1,4 +1,4 @@
-"""What decoders can do wrong with any file: containers, boundaries, textures, pictures."""
+"""Faults that concern any file: containers, boundaries, textures, pictures."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from proxyimg_codec.render import compose, pixels, view
 from proxyimg_codec.texture import diffusion, implicit, network
 
 Patch = tuple[object, str, Any]
-"""Object, attribute and what stands there instead."""
+"""An object, the name of an attribute, and the value that replaces it."""
 
 
 class Anything:
-    """Equal to whatever it is compared with."""
+    """Object that is equal to everything."""
 
     __hash__ = None  # type: ignore[assignment]  # as Python does where __eq__ is defined
 
@@ -141,6 +141,7 @@ _Coverage = Callable[..., Any]
 
 
 def _coverage(function: _Coverage) -> list[Patch]:
+    """Patches that replace the function of coverage."""
     return [(coverage, "coverage", function)]
 
 
@@ -194,4 +195,4 @@ FAULTS: dict[str, list[Patch]] = {
     "exit-code-0": [(decode, "main", _obliging)],
     "hangs": [(decode, "main", _hanging)],
 }  # fmt: skip
-"""What each wrong decoder replaces."""
+"""Patches of each decoder with a fault."""

@@ -1,4 +1,4 @@
-"""The package's decoder with one fault.
+"""Decoder of the package with one fault.
 
 As a command: ``python -m conformance.faults --fault NAME IN OUT [flags of pxi-decode]``.
 """
@@ -21,12 +21,12 @@ FAULTS: Mapping[str, list[Patch]] = {
     **pyramids.FAULTS,
     **motion.FAULTS,
 }
-"""What each wrong decoder replaces."""
+"""Patches of each decoder with a fault."""
 
 
 @contextlib.contextmanager
 def fault(name: str) -> Iterator[None]:
-    """The package with one fault."""
+    """Context in which the package has a fault."""
     with contextlib.ExitStack() as stack:
         for target, attribute, value in FAULTS[name]:
             stack.enter_context(patch.object(target, attribute, value))

@@ -1,4 +1,4 @@
-"""What decoders can do wrong with motion."""
+"""Faults of motion."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ def _interpolating(phase: int) -> Any:
 
 
 def _times(change: Callable[[Timeline, float], float]) -> list[Patch]:
-    """Timelines that take a time for another one."""
+    """Patches that replace the time by another one."""
     return [(Timeline, "taps", lambda self, t: taps_of(self, change(self, t)))]
 
 
 def _taps(change: Callable[[Timeline, Any], Any]) -> list[Patch]:
-    """Timelines that take other coefficients."""
+    """Patches that replace the coefficients that count at a time."""
 
     def taps(self: Timeline, seconds: float) -> Any:
         index, weights = taps_of(self, seconds)
@@ -50,7 +50,7 @@ def _taps(change: Callable[[Timeline, Any], Any]) -> list[Patch]:
 
 
 def _tracks(change: Callable[[Track], Track]) -> list[Patch]:
-    """Tracks that are not what the file says."""
+    """Patches that change the tracks of a file."""
     return [(track, "decode", lambda *a: [change(t) for t in decode_of(*a)])]
 
 
@@ -97,12 +97,12 @@ def _started(image: Pictured, *, t: float | None = None, **options: Any) -> Any:
 
 
 def _moments(at: Callable[[Picture, float], Picture]) -> list[Patch]:
-    """Other pictures at a time."""
+    """Patches that replace the picture at a time."""
     return [(api, "at", at), (pixels, "at", at)]
 
 
 def _posed(change: Callable[[int, Pose], dict[str, Any]]) -> list[Patch]:
-    """Poses at a time that differ, by number of the layer."""
+    """Patches that change the poses at a time, by the number of the layer."""
 
     def at(picture: Picture, t: float) -> Picture:
         made = at_of(picture, t)
@@ -186,4 +186,4 @@ FAULTS: dict[str, list[Patch]] = {
     "accepts-large-shapes": [(track, "SHAPE_MAX", 1 << 40)],
     "accepts-any-motion": [(check, "_check_motion", lambda *a: None)],
 }  # fmt: skip
-"""What each wrong decoder replaces."""
+"""Patches of each decoder with a fault."""

@@ -1,4 +1,4 @@
-"""What decoders can do wrong with meshes, poses and all else that is new in version 0.2."""
+"""Faults of meshes, poses and other parts that are new in version 0.2."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .basics import Anything, Patch
 
 
 def _posed(**change: Any) -> list[Patch]:
-    """Poses that differ from what the file says, where they are not at rest."""
+    """Patches that change the poses of a file."""
     return [(pose, "decode", lambda *a: replace(pose_of(*a), **change))]
 
 
@@ -190,4 +190,4 @@ FAULTS: dict[str, list[Patch]] = {
     "reads-the-future": [(chunks, "READABLE", tuple((0, k) for k in range(1, 20)))],
     "accepts-idle-poses": [(Pose, "at_rest", False)],
 }  # fmt: skip
-"""What each wrong decoder replaces."""
+"""Patches of each decoder with a fault."""

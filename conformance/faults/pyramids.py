@@ -1,4 +1,4 @@
-"""What decoders can do wrong with pyramid textures."""
+"""Faults of pyramid textures."""
 
 from __future__ import annotations
 
@@ -51,6 +51,8 @@ def _chroma_first(self: LevelCoder, coder: Any, ahead: Any, around: Any, given: 
 
 
 def _waves(slope: int) -> Any:
+    """Function that yields wavefronts x + `slope` * y."""
+
     def waves(support: Any) -> Iterator[context.Wave]:
         rows, columns = np.nonzero(support)
         times = columns + slope * rows
@@ -90,7 +92,7 @@ def _linear(f: Any) -> Any:
 
 
 def _sharp(f: Any) -> Any:
-    """Keys' kernel with a = -3/4."""
+    """Weights of the kernel of Keys with a = -3/4."""
     return (
         -0.75 * f * (1 - f) ** 2,
         (1.25 * f - 2.25) * f * f + 1,
@@ -203,6 +205,6 @@ _FAULTS: dict[str, list[Patch]] = {
     "trusts-samples-near": [(occlusion, "REACH", 1)],
 }  # fmt: skip
 
-# The compiled kernel would not have the faults.
+# The compiled kernel is switched off, because patches do not reach it.
 FAULTS = {name: [(kernel, "available", lambda: False), *own] for name, own in _FAULTS.items()}
-"""What each wrong decoder replaces."""
+"""Patches of each decoder with a fault."""

@@ -1,1 +1,1 @@
-"""What makes the cases: ``python -m conformance.make``."""
+"""Generator of the cases: ``python -m conformance.make``."""

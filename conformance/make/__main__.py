@@ -1,4 +1,4 @@
-"""Makes all cases anew: ``python -m conformance.make``; with --check only compares."""
+"""Generates all cases: ``python -m conformance.make``; with --check only compares them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Parts of hand-made pictures: reproducible numbers, networks, textures, paths, meshes."""
+"""Builders of parts of pictures: reproducible numbers, networks, textures, paths, meshes."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ Path = NDArray[np.int64]
 Point = tuple[float, float]
 
 _ARC = 0.5523
-"""Distance of a Bézier circle's inner control points from its corners' ends, in radii."""
+"""Distance of the inner control points of a Bézier circle from the ends of segments, in radii."""
 
 
 class Numbers:
-    """Integers from a generator whose stream numpy guarantees for all versions."""
+    """Random integers from a generator whose stream numpy guarantees for all versions."""
 
     def __init__(self, name: str) -> None:
         self.seed = zlib.crc32(name.encode())
         self._bits = np.random.PCG64(self.seed)
 
     def integers(self, low: int, high: int, shape: Sequence[int]) -> NDArray[np.int64]:
-        """Integers of low..high."""
+        """Random int64 array of a shape, with values in low..high."""
         raw = np.asarray(self._bits.random_raw(math.prod(shape)), np.uint64)
         return (raw % np.uint64(high - low + 1)).astype(np.int64).reshape(shape) + low
 
@@ -54,7 +54,18 @@ def network(
     bits: int = 8,
     contrast: float = 0.6,
 ) -> Network:
-    """A network with random weights, scaled so that at contrast 0.6 most outputs lie in 0..1."""
+    """Network with random weights, scaled so that at contrast 0.6 most outputs are in 0..1.
+
+    Args:
+        numbers: Source of random numbers.
+        dim: Number of features.
+        octaves: Octaves of the frequency encoding.
+        hidden: Width of the hidden layers.
+        depth: Number of hidden layers.
+        channels: Number of outputs.
+        bits: Bits a weight.
+        contrast: Scale of the outputs.
+    """
     shape = NetShape(dim, octaves, hidden, depth, channels)
     top = 1 << (bits - 1)
     weights = tuple(
@@ -82,16 +93,17 @@ def texture(
     stored: NDArray[np.bool_] | None = None,
     reach: float = 0.6,
 ) -> ImplicitTexture:
-    """Random codes whose features lie in about -reach..reach.
+    """Texture of random codes, whose features are in about -reach..reach.
 
     Args:
-        numbers: Where they come from.
-        dim: Features, as the network has.
+        numbers: Source of random numbers.
+        dim: Number of features, that of the network.
         grid: Columns and rows.
         bits: Bits a code.
-        network: Its index.
-        stored: bool [rows, columns], which codes are stored; all by default.
-        reach: Largest magnitude of a feature; step d is that of step 0 times 1 + d / 8.
+        network: Number of the network.
+        stored: bool [rows, columns] positions whose codes are stored; all by default.
+        reach: Largest magnitude of feature 0; the step of feature d is 1 + d / 8 times that of
+            feature 0.
     """
     columns, rows = grid
     top = 1 << (bits - 1)
@@ -102,7 +114,7 @@ def texture(
 
 
 def ellipse(centre: Point, radii: Point, *, unit: int = 4, reverse: bool = False) -> Path:
-    """Control points int64 [12, 2] of an ellipse in four segments."""
+    """Control points int64 [12, 2] of an ellipse of four segments, in 2**-unit pixel."""
     turns = [(1, 0), (0, 1), (-1, 0), (0, -1)]
     points: list[Point] = []
     for (ax, ay), (bx, by) in zip(turns, turns[1:] + turns[:1], strict=True):
@@ -113,7 +125,7 @@ def ellipse(centre: Point, radii: Point, *, unit: int = 4, reverse: bool = False
 
 
 def polygon(*corners: Point, unit: int = 4, reverse: bool = False) -> Path:
-    """Control points int64 [3 m, 2] of a polygon with m corners and straight sides."""
+    """Control points int64 [3 m, 2] of a polygon with m straight sides, in 2**-unit pixel."""
     points: list[Point] = []
     for (ax, ay), (bx, by) in zip(corners, [*corners[1:], corners[0]], strict=True):
         points += [(ax + (bx - ax) * k / 3, ay + (by - ay) * k / 3) for k in range(3)]
@@ -121,6 +133,7 @@ def polygon(*corners: Point, unit: int = 4, reverse: bool = False) -> Path:
 
 
 def _snapped(points: Sequence[Point], unit: int, reverse: bool) -> Path:
+    """Rounds points in pixels to 2**-unit pixel; `reverse` runs the path the other way."""
     path = np.floor(np.array(points) * (1 << unit) + 0.5).astype(np.int64)
     return np.roll(path[::-1], 1, axis=0) if reverse else path
 
@@ -135,15 +148,15 @@ def grid_mesh(
     keep: Sequence[int] | None = None,
     split: Sequence[Sequence[int]] = (),
 ) -> Mesh:
-    """A mesh of square cells of two triangles each, of 4 pixels by default.
+    """Mesh of square cells of two triangles each, by default of 4 pixels a side.
 
     Args:
-        origin: Canvas pixel of its corner.
+        origin: Canvas pixel of its upper left corner.
         columns: Cells across.
         rows: Cells down.
         step: Lattice spacing in 1/1024 pixel.
-        cell: Lattice units of a cell.
-        keep: The triangles it has, two a cell in raster order; all by default.
+        cell: Side of a cell in lattice units.
+        keep: Numbers of its triangles, two for each cell in raster order; all by default.
         split: Numbers of the triangles that each refinement splits.
     """
     triangles = []
@@ -162,7 +175,7 @@ def grid_mesh(
 
 
 def bend(numbers: Numbers, mesh: Mesh, reach: int = 24) -> NDArray[np.int64]:
-    """Random displacements [N, 2] of all nodes in -reach..reach, in 1/16 pixel."""
+    """Random displacements int64 [N, 2] of all nodes, in -reach..reach, in 1/16 pixel."""
     return numbers.integers(-reach, reach, mesh.refined.nodes.shape)
 
 
@@ -176,7 +189,7 @@ def layer(
     pose: Pose = REST,
     sampling: int = 0,
 ) -> Layer:
-    """A layer; without paths it covers the whole canvas."""
+    """Layer of a picture; without paths it covers the whole canvas."""
     boundary = Boundary(unit, paths) if paths else None
     return Layer(name, box, boundary, texture, mesh, sampling, pose)
 
@@ -188,13 +201,13 @@ def picture(
     opaque: bool = True,
     extra: Sequence[Chunk] = (),
 ) -> Picture:
-    """An image of `layers`, back to front."""
+    """Picture of layers, back to front."""
     channels = max(v.texture.channels(networks) for v in layers)
     return Picture(*size, channels, opaque, 8, Layers(layers), networks, extra=tuple(extra))
 
 
 def layered(n: Numbers, channels: int = 3) -> Picture:
-    """Three layers: a back, an ellipse and a triangle that overlap."""
+    """Picture of three layers that overlap: a back, an ellipse and a triangle."""
     w, h = 32, 24
     return picture(
         (w, h),
@@ -211,33 +224,33 @@ def layered(n: Numbers, channels: int = 3) -> Picture:
 
 
 SIZE = 24, 18
-"""Canvas of `disc_on_back`."""
+"""Width and height of the canvas of `on_back`."""
 
 
 def disc(n: Numbers, mesh: Mesh | None = None, **pose: Any) -> Layer:
-    """A disc over a plane of fine detail, posed."""
+    """Layer of a disc with a fine texture, in a pose."""
     plane = texture(n, grid=(9, 8))
     shape = ellipse((12, 9), (7, 5.5))
     return layer("disc", (4, 3, 16, 12), plane, shape, mesh=mesh, pose=Pose(**pose))
 
 
 def on_back(n: Numbers, *layers: Layer, channels: int = 3) -> Picture:
-    """A picture of `SIZE` with a back layer behind `layers`, and one network."""
+    """Picture of `SIZE` with one network, and a back layer behind `layers`."""
     back = layer("back", (0, 0, *SIZE), texture(n))
     net = network(n, channels=channels, contrast=0.6 if channels == 3 else 1.5)
     return picture(SIZE, [back, *layers], net, opaque=channels == 3)
 
 
 def values(chunk: Chunk) -> dict[str, Any]:
-    """The values of a chunk by key."""
+    """Values of a chunk by key."""
     return unpack(fields_of(chunk), chunk.payload, "")
 
 
 def changed(chunk: Chunk, new: Mapping[str, Any], *, in_map: bool = False) -> Chunk:
-    """A chunk with other, added or (if None) removed values, right or wrong.
+    """Chunk with changed, added or (if None) removed values, which need not be valid.
 
     Args:
-        chunk: What it is made from.
+        chunk: The chunk to change.
         new: The changes, by key.
         in_map: Whether it holds a map, as versions 0.1 and 0.2 wrote it.
     """
@@ -246,7 +259,7 @@ def changed(chunk: Chunk, new: Mapping[str, Any], *, in_map: bool = False) -> Ch
 
 
 def with_maps(data: bytes, version: tuple[int, int], without: Sequence[str] = ()) -> bytes:
-    """A file of another version, with maps in all chunks but those of the types `without`."""
+    """File of another version, with maps in all chunks except those of the types `without`."""
     return write(
         [
             changed(c, {}, in_map=True) if fields_of(c) and c.type not in without else c

@@ -1,4 +1,4 @@
-"""Zstandard frames by hand (RFC 8878), so that no library's version matters, right or wrong."""
+"""Builder of Zstandard frames (RFC 8878), valid or not, independent of any library's version."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ BLOCK_MAX = 1 << 17
 RAW, REPEATED = 0, 1
 
 Run = tuple[int, int]
-"""A byte, and how often it comes."""
+"""A byte and the number of its repetitions."""
 
 
 def frame(
@@ -25,14 +25,14 @@ def frame(
     checksum: bytes = b"",
     flags: int = 0,
 ) -> bytes:
-    """A frame of blocks that are raw or repeat a byte.
+    """Frame of blocks that are raw or repeat a byte.
 
     Args:
-        parts: What it holds: bytes, or runs.
-        size: What it announces to hold; the truth by default.
-        window: Byte that gives the size of the window, of a frame that announces no size.
+        parts: Its content: bytes, or runs.
+        size: Size of the content that it announces; the true one by default.
+        window: Byte that gives the size of the window, for a frame that announces no size.
         checksum: Four bytes at its end, or none.
-        flags: More bits of its descriptor.
+        flags: Additional bits of its descriptor.
     """
     total = sum(p[1] if isinstance(p, tuple) else len(p) for p in parts) if size is None else size
     flags |= 4 if checksum else 0
@@ -47,7 +47,7 @@ def frame(
 
 
 def _blocks(part: bytes | Run) -> list[tuple[int, int, bytes]]:
-    """Kind, size and content of blocks."""
+    """Kind, size and content of the blocks of a part."""
     if isinstance(part, tuple):
         byte, count = part
         sizes = [min(BLOCK_MAX, count - at) for at in range(0, count, BLOCK_MAX)]
@@ -57,17 +57,17 @@ def _blocks(part: bytes | Run) -> list[tuple[int, int, bytes]]:
 
 
 def checksum(content: bytes) -> bytes:
-    """The checksum of what a frame holds."""
+    """Checksum of the content of a frame, 4 bytes."""
     return zstandard.ZstdCompressor(write_checksum=True).compress(content)[-4:]
 
 
 def metadata(kind: str, content: bytes, zstd: bytes | None = None, **new: Any) -> Chunk:
-    """A metadata chunk of one of `BLOCKS`, perhaps with another frame or size."""
+    """Metadata chunk of one of `BLOCKS`, perhaps with another frame or size."""
     values = {"size": len(content), "zstd": frame(content) if zstd is None else zstd, **new}
     return Chunk(BLOCKS[kind], msgpack.packb([values["size"], values["zstd"]]))
 
 
 def one_block(content: bytes) -> bytes:
-    """A frame of one raw block, of at most 255 bytes, that tells their number in one byte."""
+    """Frame of one raw block of at most 255 bytes, which gives their number in one byte."""
     head = (len(content) << 3 | 1).to_bytes(3, "little")
     return MAGIC + bytes([0x20, len(content)]) + head + content

@@ -1,7 +1,8 @@
-"""What makes cases, writes them, and compares them with those on the disk.
+"""Generator of the cases: makes them, writes them, and compares them with those on disk.
 
-Inputs and descriptions are the same on every machine. Expected pixels come from the package's
-plain numpy decoder, whose last bits may differ from machine to machine, and are not compared.
+Inputs and descriptions are the same on every machine. Expected pixels come from the plain numpy
+decoder of the package. Their last bits may differ between machines, therefore they are not
+compared.
 """
 
 from __future__ import annotations
@@ -35,10 +36,10 @@ from .registry import Valid
 from .topics import statements
 
 PROVENANCE = "conformance.make_cases"
-"""What descriptions call the maker. It is `conformance.make` now; descriptions do not change."""
+"""Former name of the generator, which is kept so that descriptions do not change."""
 
 PEAK, RMS = 0.05, 0.01
-"""Errors in 8-bit levels that are allowed: ten times what float32 sums in another order cost."""
+"""Allowed errors in 8-bit levels: ten times those of float32 sums in another order."""
 
 Made = tuple[bytes, dict[str, Any]]
 """Input and description of a case."""
@@ -46,10 +47,10 @@ Made = tuple[bytes, dict[str, Any]]
 
 @functools.cache
 def build() -> dict[str, Made]:
-    """All cases by name.
+    """Makes all cases, by name.
 
     Raises:
-        RuntimeError: The package itself does not do with an input what the case demands.
+        RuntimeError: The package itself does not do with an input what its case demands.
     """
     refused = {name: bad for cases in REFUSED.values() for name, bad in cases.items()}
     bases = {bad.base: bad.base() for bad in refused.values()}
@@ -60,6 +61,7 @@ def build() -> dict[str, Made]:
 
 
 def _valid(name: str, case: Valid) -> Made:
+    """Makes a valid case."""
     numbers = Numbers(name)
     made = case.build(numbers)
     data = made if isinstance(made, bytes) else to_bytes(made)
@@ -73,6 +75,7 @@ def _valid(name: str, case: Valid) -> Made:
 
 
 def _refused(name: str, bad: Refused, data: bytes) -> Made:
+    """Makes a case that must be refused, from a base file that is broken to `data`."""
     error = name.split("-")[0]
     raised = _refusal(name, data)
     if raised.exit_code != EXIT_CODES[error] or not raised.rule:
@@ -86,6 +89,7 @@ def _refused(name: str, bad: Refused, data: bytes) -> Made:
 
 
 def _described(case: Valid | Refused, seed: int, *rules: str) -> dict[str, Any]:
+    """Part of a description that all cases have."""
     return {
         "title": case.title,
         "tests": statements([*case.tests, *rules]),
@@ -94,6 +98,7 @@ def _described(case: Valid | Refused, seed: int, *rules: str) -> dict[str, Any]:
 
 
 def _renders(wanted: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Descriptions of renders."""
     return [
         {"args": args, "expected": f"expected-{i}.png", "peak": PEAK, "rms": RMS}
         for i, args in enumerate(wanted, 1)
@@ -101,7 +106,11 @@ def _renders(wanted: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _refusal(name: str, data: bytes) -> errors.PxiError:
-    """What the package says of a file that must be refused."""
+    """Error that the package raises for a file that must be refused.
+
+    Raises:
+        RuntimeError: It accepts the file.
+    """
     try:
         from_bytes(data).render()
     except errors.PxiError as error:
@@ -110,7 +119,7 @@ def _refusal(name: str, data: bytes) -> errors.PxiError:
 
 
 def _profile(data: bytes, error: str) -> str:
-    """The lowest profile whose readers find the error in a file, and not another before."""
+    """Lowest profile whose readers find the error in a file, and not another one before it."""
     if error == "unsupported":
         return PROFILES[0]
     found = []
@@ -122,29 +131,30 @@ def _profile(data: bytes, error: str) -> str:
 
 
 def _node_sampling(chunk: chunks.Chunk) -> bool:
+    """Whether a chunk is a LAYR with node sampling."""
     with contextlib.suppress(errors.PxiError):
         return chunk.type == layr.TYPE and values(chunk)["sampling"] > 0
     return False
 
 
 def as_text(description: dict[str, Any]) -> str:
-    """The text of `case.json`."""
+    """Text of `case.json`."""
     return json.dumps(description, indent=1) + "\n"
 
 
 def place(name: str) -> str:
-    """Where a case lies in the folder of all cases."""
+    """Folder of a case within the folder of all cases."""
     return f"{KIND_OF[name]}/{name}"
 
 
 def _present(folder: Path) -> set[str]:
-    """Where there are files, within the folder of all cases."""
+    """Folders with files, within the folder of all cases."""
     found = (f.parent for f in folder.rglob("*") if f.is_file())
     return {parent.relative_to(folder).as_posix() for parent in found}
 
 
 def differences(folder: Path = FOLDER) -> list[str]:
-    """Places of cases whose input or description on disk is not what the generator makes."""
+    """Folders of cases whose input or description on disk differs from what the generator makes."""
     made = {place(name): case for name, case in build().items()}
     there = _present(folder)
     wrong = sorted(there ^ made.keys())
@@ -158,10 +168,10 @@ def differences(folder: Path = FOLDER) -> list[str]:
 
 
 def write(folder: Path = FOLDER) -> None:
-    """Replaces all cases.
+    """Replaces all cases on disk.
 
     Raises:
-        RuntimeError: The package itself does not do with an input what the case demands.
+        RuntimeError: The package itself does not do with an input what its case demands.
     """
     with mock.patch.dict(os.environ, PROXYIMG_NO_KERNEL="1"):
         kernel.library.cache_clear()
@@ -170,7 +180,7 @@ def write(folder: Path = FOLDER) -> None:
 
 
 def _write(folder: Path) -> None:
-    """Makes all cases, then removes others and replaces those that differ."""
+    """Makes all cases, removes others from the disk, and replaces those that differ."""
     made = build()
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=folder.parent, prefix="cases-") as temporary:
@@ -197,6 +207,7 @@ def _alike(one: Path, other: Path) -> bool:
 
 
 def _make(folder: Path, made: Mapping[str, Made]) -> None:
+    """Writes cases with their expected pictures into a folder."""
     for name, (data, description) in made.items():
         target = folder / place(name)
         target.mkdir(parents=True)
@@ -205,7 +216,7 @@ def _make(folder: Path, made: Mapping[str, Made]) -> None:
         for render in description.get("renders", []):
             args = dict(render["args"])
             at = args.pop("time", None)
-            # What is optional shows what the same file shows without its fault.
+            # An optional case shows the same picture as the file without its fault.
             shown = REFUSED[KIND_OF[name]][name].base().data if "error" in description else data
             pixels = from_bytes(shown).render(t=at, **args, dtype=np.uint16, engine="numpy")
             (target / render["expected"]).write_bytes(encode_png(pixels))

@@ -1,4 +1,4 @@
-"""All cases, by kind: each module of ``valid`` and of ``refused`` makes one kind."""
+"""All cases by kind; each module of ``valid`` and of ``refused`` makes one kind."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .registry import Valid
 
 
 def _cases(module: str) -> Any:
-    """The cases of a module of this package."""
+    """Cases of a module of this package."""
     return importlib.import_module(f".{module}", __package__).CASES
 
 
@@ -31,9 +31,9 @@ REFUSED: Mapping[str, Mapping[str, Refused]] = {
         "motion", "metadata",
     )
 }  # fmt: skip
-"""Cases of files that must be refused, likewise."""
+"""Cases of files that must be refused, by kind and name."""
 
 KIND_OF: Mapping[str, str] = {
     name: kind for kind, cases in (*VALID.items(), *REFUSED.items()) for name in cases
 }
-"""Kind of each case, which is the folder that it lies in."""
+"""Kind of each case, which is the name of the folder that contains it."""

@@ -1,4 +1,4 @@
-"""The list of valid cases."""
+"""Registry of valid cases."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from .builders import Numbers
 Args = Mapping[str, Any]
 Build = Callable[[Numbers], Picture | bytes]
 WHOLE: Args = {}
-"""Arguments of the plainest render."""
+"""Arguments of a render of the whole picture at its own size."""
 
 
 @dataclass(frozen=True)
 class Valid:
-    """A valid case.
+    """Valid case.
 
     Attributes:
-        title: One sentence.
-        tests: What it is there for: topics of `topics`, or ids of statements.
-        build: Makes the picture, or its file where the package would not write it so.
+        title: Description, one sentence.
+        tests: Topics of `topics`, or ids of statements, that it tests.
+        build: Function that makes the picture, or the file if the package would not write it so.
         renders: Arguments of each render, as in `cases.Render`.
     """
 
@@ -39,7 +39,14 @@ class Valids(dict[str, Valid]):
     def case(
         self, title: str, *tests: str, renders: Sequence[Args] = (WHOLE,), name: str = ""
     ) -> Callable[[Build], None]:
-        """Decorates a builder, whose name, with dashes, becomes that of the case by default."""
+        """Decorator that registers a builder as a case.
+
+        Args:
+            title: Description, one sentence.
+            *tests: Topics or ids of statements.
+            renders: Arguments of each render.
+            name: Name of the case; by default that of the builder, with dashes.
+        """
 
         def register(build: Build) -> None:
             known = name or getattr(build, "__name__", "").strip("_").replace("_", "-")

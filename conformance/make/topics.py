@@ -1,4 +1,4 @@
-"""What valid cases are there for: names for statements that a decoder breaks together."""
+"""Topics of valid cases: names for sets of statements that a decoder breaks together."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ import re
 from collections.abc import Iterable, Mapping
 
 ID = re.compile(r"[A-Z]{3}-[1-9][0-9]*")
-"""The id of a statement of the specification."""
+"""Pattern of the ids of statements of the specification."""
 
 
 def _run(prefix: str, first: int, last: int) -> str:
+    """Ids with the numbers `first`..`last`, separated by spaces."""
     return " ".join(f"{prefix}-{k}" for k in range(first, last + 1))
 
 
@@ -123,10 +124,10 @@ TOPICS: Mapping[str, tuple[str, ...]] = {
 
 
 def statements(words: Iterable[str]) -> list[str]:
-    """The ids that topics and ids stand for, in order, each once.
+    """Ids that topics and ids stand for, sorted, each once.
 
     Raises:
-        ValueError: A word is neither.
+        ValueError: A word is neither a topic nor an id.
     """
     found: set[str] = set()
     for word in words:
@@ -140,5 +141,5 @@ def statements(words: Iterable[str]) -> list[str]:
 
 
 def order(id_: str) -> tuple[str, int]:
-    """What ids are sorted by."""
+    """Sorting key of an id."""
     return id_[:3], int(id_[4:])

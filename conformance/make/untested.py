@@ -1,4 +1,4 @@
-"""Statements of the specification that no case can test, and why."""
+"""Statements of the specification that no case can test, with reasons."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether the suite catches decoders with small faults: ``python -m conformance.mutants``."""
+"""Measures whether the suite detects small faults: ``python -m conformance.mutants``."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-# Before numpy starts threads: products of the sizes here gain nothing from them.
+# Set before numpy starts threads, from which the small matrix products here gain nothing.
 os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"))
 
 from ..cases import load
@@ -20,7 +20,7 @@ from .verdicts import WANTED, Suite, all_mutants, judged, summary
 
 
 def arguments() -> argparse.ArgumentParser:
-    """The command line."""
+    """Parser of the command line."""
     p = argparse.ArgumentParser(
         "conformance.mutants", description="Test the suite with decoders that have small faults."
     )
@@ -33,7 +33,7 @@ def arguments() -> argparse.ArgumentParser:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point: 0 if enough mutants are caught, else 1."""
+    """Entry point; returns 0 if enough mutants are caught, otherwise 1."""
     parser = arguments()
     args = parser.parse_args(argv)
     suite = Suite(load())

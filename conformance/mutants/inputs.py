@@ -1,7 +1,8 @@
-"""Files that are not in the suite, and what the decoder makes of them as it is.
+"""Files outside the suite, and the results of the decoder for them.
 
-Pictures that the encoder makes, edits and motions of these and of the suite's pictures, and damaged
-files. They are not of the suite's making, so that a fault that it misses may show in them.
+They are pictures that the encoder makes, edits and motions of these and of the suite's pictures,
+and damaged files. They are made independently of the suite, so that a fault that the suite misses
+may show in them.
 """
 
 from __future__ import annotations
@@ -29,25 +30,29 @@ PHOTO = Path(__file__).parents[2] / "docs" / "images" / "photo.png"
 SEED = 7
 
 TAKEN, MOVING, DAMAGED = 120, 40, 2
-"""How many of the suite's pictures are edited, how many get a motion, and damaged files of each."""
+"""Numbers of pictures of the suite to edit, of pictures to move, and of damaged files of each."""
 
 PATIENCE, PIXELS = 10, 1 << 15
-"""Seconds of processor time that a file may take, and pixels of its canvas."""
+"""Most processor time in seconds that a file may take, and most pixels of its canvas."""
 
 PEAK, RMS = 0.05, 0.01
-"""As in the suite: what differs less is no fault."""
+"""Tolerances in 8-bit levels, as in the suite."""
 
 Args = Mapping[str, Any]
 
 
 @functools.cache
 def folder() -> tempfile.TemporaryDirectory[str]:
-    """Where the files are, until the program ends."""
+    """Folder of the files, which exists until the program ends."""
     return tempfile.TemporaryDirectory(prefix="pxi-inputs-")
 
 
 def cases() -> list[Case]:
-    """The files as cases, whose expected results are those of the decoder as it is."""
+    """Makes the files as cases; their expected results are those of the decoder without a fault.
+
+    Raises:
+        RuntimeError: The files could not be made.
+    """
     place = Path(folder().name)
     said, status = forked(lambda out: _make(place, lambda name: print(name, file=out)))
     if status:
@@ -86,14 +91,15 @@ def _make(place: Path, say: Callable[[str], None]) -> None:
 
 
 def _too_slow(*_: object) -> None:
+    """Signal handler that raises `TimeoutError`."""
     raise TimeoutError
 
 
 def _expected(target: Path, data: bytes, dice: random.Random | None) -> dict[str, Any]:
-    """What the decoder makes of a valid file, for its `case.json`.
+    """Content of `case.json` for a valid file: renders, level and latents.
 
     Raises:
-        MemoryError: It is too large to try all mutants on it.
+        MemoryError: The canvas is too large to try all mutants on the file.
     """
     from proxyimg_codec import from_bytes
     from proxyimg_codec.io.raster import encode_png
@@ -115,7 +121,7 @@ def _expected(target: Path, data: bytes, dice: random.Random | None) -> dict[str
 
 
 def _views(image: Any, dice: random.Random | None) -> Iterator[Args]:
-    """What is asked of a picture: the whole, and with `dice` more."""
+    """Yields arguments of renders: the whole picture, and with `dice` random others."""
     yield {}
     if dice is None:
         return
@@ -129,7 +135,7 @@ def _views(image: Any, dice: random.Random | None) -> Iterator[Args]:
 
 
 def _files(dice: random.Random) -> Iterator[tuple[str, bytes]]:
-    """Files by name."""
+    """Yields the files and their names."""
     from proxyimg_codec import from_bytes
     from proxyimg_codec.errors import PxiError
 
@@ -144,14 +150,14 @@ def _files(dice: random.Random) -> Iterator[tuple[str, bytes]]:
             if number < MOVING and image.timeline is None:
                 yield f"{name}-moving", _moving(image, dice).to_bytes()
         except PxiError:
-            continue  # not every picture can be edited so
+            continue  # some edits are not possible for some pictures
     for name, data in good.items():
         for number in range(DAMAGED):
             yield f"{name}-damaged-{number}", _damaged(data, dice)
 
 
 def _encoded() -> Iterator[tuple[str, Any]]:
-    """Small pictures encoded in several ways."""
+    """Yields small pictures that are encoded in several ways, and their names."""
     import proxyimg_codec as pxi
     from proxyimg_codec.io.raster import read
 
@@ -182,11 +188,11 @@ def _encoded() -> Iterator[tuple[str, Any]]:
             try:
                 yield f"{kind}-{how}", pxi.encode(pixels, masks=regions, jobs=1, **options)
             except pxi.UsageError:
-                continue  # not every setting fits every picture
+                continue  # some settings are not possible for some pictures
 
 
 def _edits(image: Any, dice: random.Random) -> list[dict[str, Any]]:
-    """A few operations on layers other than the back, if there are any."""
+    """Makes three random operations, on layers other than the back if there are any."""
     names = [layer.name for layer in image.layers][1 if image.opaque else 0 :]
     if not names:
         return [{"op": "recolour", "layer": 0, "hue": 40}]
@@ -211,7 +217,7 @@ def _edits(image: Any, dice: random.Random) -> list[dict[str, Any]]:
 
 
 def _moving(image: Any, dice: random.Random) -> Any:
-    """The picture with one of the motions that suit any."""
+    """Adds a random preset motion to a picture."""
     from proxyimg_codec.animate.animate import preset
     from proxyimg_codec.animate.motion import PRESETS
 
@@ -220,7 +226,7 @@ def _moving(image: Any, dice: random.Random) -> Any:
 
 
 def _damaged(data: bytes, dice: random.Random) -> bytes:
-    """A file with one value or byte of one chunk changed, and the right checksums."""
+    """Changes one value or bit of one chunk; the checksums are valid."""
     from dataclasses import replace
 
     from proxyimg_codec.container.chunks import read, write
@@ -242,7 +248,7 @@ def _damaged(data: bytes, dice: random.Random) -> bytes:
 
 
 def _other(value: Any, dice: random.Random) -> Any:
-    """A value that is near to another."""
+    """Value that differs a little from another."""
     if isinstance(value, int):
         return dice.choice([value + 1, value - 1, -value, 2 * value, 0, 1, value ^ 1 << 7])
     if isinstance(value, bytes):
@@ -255,7 +261,7 @@ def _other(value: Any, dice: random.Random) -> Any:
 
 
 def _flipped(data: bytes, dice: random.Random) -> bytes:
-    """Bytes with one bit changed."""
+    """Flips one bit."""
     if not data:
         return b"\1"
     at = dice.randrange(len(data))

@@ -1,4 +1,4 @@
-"""The places of a source where something small can be wrong, and what.
+"""Mutation operators: small changes of a source that may make it wrong.
 
 The operators are those of Offutt et al. 1996, "An Experimental Determination of Sufficient Mutant
 Operators", and a few for arrays.
@@ -17,7 +17,7 @@ _COMPARED: dict[type[ast.cmpop], type[ast.cmpop]] = {
     ast.NotEq: ast.Eq, ast.Is: ast.IsNot, ast.IsNot: ast.Is, ast.In: ast.NotIn, ast.NotIn: ast.In,
 }  # fmt: skip
 _OPPOSED = (ast.Eq, ast.NotEq, ast.Is, ast.IsNot, ast.In, ast.NotIn)
-"""Comparisons of which the other is the opposite."""
+"""Comparisons that `_COMPARED` replaces by their opposites."""
 
 _COMPUTED: dict[type[ast.operator], type[ast.operator]] = {
     ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.FloorDiv, ast.FloorDiv: ast.Mult,
@@ -31,26 +31,26 @@ _NAMES = (
 _RENAMED = {a: b for pair in _NAMES for a, b in (pair, pair[::-1])}
 
 _NUMBERS = re.compile(r"(Ints|Floats|Reals|Values|NDArray\[np\.(u?int|float)\d+\]|int|float)$")
-"""Types of results that have a negative."""
+"""Pattern of result types that can be negated."""
 
 _ELSEWHERE = {
     "kernel", "context_native", "synthesis_native", "native", "run_native", "cache", "_caching",
     "progress", "TYPE_CHECKING",
 }  # fmt: skip
-"""Names in what changes no pixel: the compiled kernel, caches, reports of progress."""
+"""Names in code that changes no pixel: the compiled kernel, caches, reports of progress."""
 
 
 @dataclass
 class Change:
-    """Another child of a node.
+    """Replacement of a child of a node.
 
     Attributes:
         parent: The node.
-        field: Which of its fields.
-        index: Position in the field, if that is a list.
-        other: The other child.
-        operator: What kind of change.
-        statement: The statement that it is in.
+        field: Name of the field that holds the child.
+        index: Position in the field if that is a list.
+        other: The replacement.
+        operator: Name of the mutation operator.
+        statement: The statement that contains the node.
         function: Qualified name of the function; empty at the level of the module.
     """
 
@@ -63,7 +63,7 @@ class Change:
     function: str
 
     def swap(self) -> None:
-        """Makes the change, and if it is made, undoes it."""
+        """Makes the change; a second call undoes it."""
         here = getattr(self.parent, self.field)
         if self.index is None:
             setattr(self.parent, self.field, self.other)
@@ -75,17 +75,16 @@ class Change:
 def changes(tree: ast.Module) -> list[Change]:
     """All changes of a source, in the order of its text.
 
-    Statements that touch the compiled kernel or a cache are left alone, and so are messages of
-    errors, annotations, defaults of arguments, assertions, imports, and what classes say of their
-    fields.
+    Statements about the compiled kernel or a cache are not changed. Neither are error messages,
+    annotations, defaults of arguments, assertions, imports, and declarations of fields in classes.
     """
     return [change for statement in tree.body for change in _of_statement(statement, "", False)]
 
 
 def _of_block(node: ast.AST, field: str, function: str, negative: bool) -> Iterator[Change]:
-    """Of the statements in a list of a node, and without them."""
+    """Yields changes of the statements in a field of a node, and removals of statements."""
     for index, statement in enumerate(getattr(node, field)):
-        # An assignment to a name is not dropped: what follows would only not run.
+        # Assignments to names are kept: without them, code that follows would only not run.
         droppable = isinstance(statement, ast.Raise | ast.AugAssign | ast.Continue | ast.Break) or (
             isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Call)
         )
@@ -97,7 +96,13 @@ def _of_block(node: ast.AST, field: str, function: str, negative: bool) -> Itera
 
 
 def _of_statement(statement: ast.stmt, function: str, negative: bool) -> Iterator[Change]:
-    """Of one statement and those in it; `negative`: whether its function returns numbers."""
+    """Yields changes of a statement and of all in it.
+
+    Args:
+        statement: The statement.
+        function: Qualified name of the function around it.
+        negative: Whether that function returns numbers, which can be negated.
+    """
     inside: Mapping[type, tuple[str, ...]] = {
         ast.For: ("body", "orelse"), ast.While: ("body",), ast.With: ("body",),
         ast.Try: ("body", "orelse", "finalbody"), ast.If: ("body", "orelse"),
@@ -134,13 +139,13 @@ def _of_statement(statement: ast.stmt, function: str, negative: bool) -> Iterato
 
 
 def _elsewhere(node: ast.AST) -> bool:
-    """Whether something has to do with what changes no pixel."""
+    """Whether a node is about things that change no pixel."""
     names = (getattr(part, "id", getattr(part, "attr", None)) for part in ast.walk(node))
     return not {*names}.isdisjoint(_ELSEWHERE)
 
 
 def _of_fields(node: ast.AST, statement: ast.stmt, function: str) -> Iterator[Change]:
-    """Of the parts of a node, but annotations."""
+    """Yields changes of all parts of a node except annotations."""
     for field, value in ast.iter_fields(node):
         if field == "annotation":
             continue
@@ -154,7 +159,7 @@ def _of_fields(node: ast.AST, statement: ast.stmt, function: str) -> Iterator[Ch
 def _of_child(
     parent: ast.AST, field: str, index: int | None, statement: ast.stmt, function: str
 ) -> Iterator[Change]:
-    """Of a part of an expression, and all that is in it."""
+    """Yields changes of one part of an expression and of all in it."""
     node: Any = getattr(parent, field) if index is None else getattr(parent, field)[index]
     if isinstance(node, ast.JoinedStr) or not hasattr(node, "_fields"):
         return
@@ -195,6 +200,7 @@ def _of_child(
 def _of_operator(
     node: ast.AST, field: str, index: int | None, statement: ast.stmt, function: str
 ) -> Iterator[Change]:
+    """Yields the change of an operator."""
     old = getattr(node, field) if index is None else getattr(node, field)[index]
     kind = type(old)
     if kind in _COMPARED:
@@ -204,7 +210,7 @@ def _of_operator(
 
 
 def _near(value: Any) -> tuple[Any, ...]:
-    """Other constants instead of one."""
+    """Constants to replace another by."""
     if isinstance(value, bool):
         return (not value,)
     return (value + 1, value - 1) if isinstance(value, int | float) else ()

@@ -1,4 +1,4 @@
-"""What lines of the decoder each case runs."""
+"""Recording of the lines of the decoder that each case runs."""
 
 from __future__ import annotations
 
@@ -20,18 +20,21 @@ from .runs import ROOT, Decoder, forked
 Lines = set[tuple[str, int]]
 
 SLOWER, LEAST = 5, 1.0
-"""A case may take so many times the processor time that it takes while its lines are recorded,
-which is twice what it takes alone; and at least these seconds."""
+"""Limits on the processor time of a case.
+
+The first is a factor of the time that the case takes while its lines are recorded, which is twice
+its usual time. The second is the least limit in seconds.
+"""
 
 
 @dataclass
 class Record:
-    """What the right decoder does.
+    """Behaviour of the decoder without a fault.
 
     Attributes:
         seconds: Processor time of each case while its lines are recorded.
-        caps: Processor time that each may take.
-        cases: Names of the cases that run a line, by file within the package and number.
+        caps: Processor time that each case may take.
+        cases: Names of the cases that run a line, by file within the package and line number.
         importing: Lines that run when modules are imported.
     """
 
@@ -41,7 +44,7 @@ class Record:
     importing: Lines = field(default_factory=set)
 
     def of(self, file: str, first: int, last: int) -> set[str]:
-        """The cases that run one of some lines; all if they run at import."""
+        """Names of the cases that run a line in `first`..`last`; all if one runs at import."""
         lines = [(file, n) for n in range(first, last + 1)]
         if not self.importing.isdisjoint(lines):
             return {*self.seconds}
@@ -49,10 +52,10 @@ class Record:
 
 
 def recorded(cases: Sequence[Case]) -> Record:
-    """What lines the cases run, and how long they take.
+    """Runs all cases; records their lines and times.
 
     Raises:
-        RuntimeError: The decoder fails a case as it is.
+        RuntimeError: The decoder without a fault fails a case.
     """
     record = Record()
     said, status = forked(lambda out: _record_all(cases, out))
@@ -73,17 +76,19 @@ def recorded(cases: Sequence[Case]) -> Record:
 
 
 def _record_all(cases: Sequence[Case], out: io.TextIOBase) -> None:
+    """Writes the record of the import and of each case as lines of JSON."""
     with _traced() as lines:
         decode = Decoder(None)
     print(json.dumps({"case": "", "problem": "", "lines": _listed(lines)}), file=out)
     for case in cases:
-        # What is computed once and kept must be seen in every case.
+        # Each case has a process of its own, so that caches of others do not hide lines.
         said, status = forked(partial(_record_one, case, decode))
         end = {"case": case.name, "problem": f"status {status}"}
         print("\n".join(said) if said and not status else json.dumps(end), file=out)
 
 
 def _record_one(case: Case, decode: Decoder, out: io.TextIOBase) -> None:
+    """Writes the record of one case as a line of JSON."""
     before = time.process_time()
     with _traced() as lines:
         problem = decode.problem(case)
@@ -93,6 +98,7 @@ def _record_one(case: Case, decode: Decoder, out: io.TextIOBase) -> None:
 
 
 def _listed(lines: Lines) -> Mapping[str, list[int]]:
+    """Line numbers by file."""
     found: dict[str, list[int]] = {}
     for file, number in sorted(lines):
         found.setdefault(file, []).append(number)
@@ -101,7 +107,7 @@ def _listed(lines: Lines) -> Mapping[str, list[int]]:
 
 @contextlib.contextmanager
 def _traced() -> Iterator[Lines]:
-    """The lines of the package that run, by file within it."""
+    """Context that yields a set of the lines of the package that run, filled as they do."""
     lines: Lines = set()
     files: dict[str, str | None] = {}
 

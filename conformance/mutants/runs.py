@@ -25,25 +25,25 @@ from ..judge import Ended, judge
 
 PACKAGE = "proxyimg_codec"
 SYMBOLS = "conformance.symbols"
-"""What hashes latents; it is imported anew with the package."""
+"""Module that hashes latents; it is imported again with the package."""
 
 ROOT = Path(__file__).parents[2] / PACKAGE
 
 MEMORY = 1 << 30
-"""Bytes of data that a run may hold, as with `conformance.runner`."""
+"""Most bytes of data that a run may hold, as in `conformance.runner`."""
 
 
 IMPORT = 30.0
-"""Seconds of processor time in which the decoder must be imported."""
+"""Most processor time in seconds for the import of the decoder."""
 
 
 @dataclass(frozen=True)
 class Fault:
-    """A module in another version.
+    """Changed version of a module.
 
     Attributes:
         file: Path within the package.
-        code: The module compiled.
+        code: The compiled module.
     """
 
     file: str
@@ -52,11 +52,11 @@ class Fault:
 
 @dataclass(frozen=True)
 class Caught:
-    """The first case that a decoder fails.
+    """First case that a decoder fails.
 
     Attributes:
-        case: Its name; empty if the decoder could not even be imported.
-        problem: As in `judge.Result`, or ``hang``, ``crash`` or ``import``.
+        case: Name of the case; empty if the decoder could not be imported.
+        problem: Problem as in `judge.Result`, or ``hang``, ``crash`` or ``import``.
     """
 
     case: str
@@ -64,12 +64,15 @@ class Caught:
 
 
 def run(cases: Sequence[Case], fault: Fault | None, seconds: Mapping[str, float]) -> Caught | None:
-    """What is wrong with a decoder, if anything: `cases` are tried in order until one fails.
+    """Tries cases in order until the decoder fails one.
 
     Args:
-        cases: What it must do.
-        fault: What is wrong with it.
+        cases: The cases.
+        fault: Fault of the decoder; None for none.
         seconds: Processor time that each case may take.
+
+    Returns:
+        The case that failed; None if none did.
     """
     said, status = forked(lambda out: _try_all(cases, fault, seconds, out))
     if not said or not said[-1].startswith("{"):
@@ -80,9 +83,14 @@ def run(cases: Sequence[Case], fault: Fault | None, seconds: Mapping[str, float]
 
 
 def forked(work: Callable[[io.TextIOBase], None]) -> tuple[list[str], int]:
-    """The lines that `work` writes in a process of its own, and how that ends.
+    """Runs a function in a process of its own.
 
-    The end is an exit status, or the negative number of a signal.
+    Args:
+        work: Function that writes lines to the file it is given.
+
+    Returns:
+        The lines; the exit status of the process, or the negative number of the signal that ended
+        it.
     """
     source, target = os.pipe()
     with tempfile.TemporaryDirectory(prefix="pxi-mutants-") as folder, warnings.catch_warnings():
@@ -97,7 +105,7 @@ def forked(work: Callable[[io.TextIOBase], None]) -> tuple[list[str], int]:
                 with open(target, "w", encoding="utf-8", buffering=1) as out:
                     work(out)
                 status = 0
-            except BaseException:  # the process ends here, whatever it was
+            except BaseException:  # nothing may leave the child process
                 traceback.print_exc()
             finally:
                 os._exit(status)
@@ -111,7 +119,7 @@ def forked(work: Callable[[io.TextIOBase], None]) -> tuple[list[str], int]:
 def _try_all(
     cases: Sequence[Case], fault: Fault | None, seconds: Mapping[str, float], out: io.TextIOBase
 ) -> None:
-    """Writes the name of each case before it runs, and in the end what failed."""
+    """Writes the name of each case before it runs, and at the end the problem as JSON."""
     name, problem = "", ""
     signal.setitimer(signal.ITIMER_PROF, IMPORT)
     try:
@@ -130,10 +138,12 @@ def _try_all(
 
 
 class Decoder:
-    """The package's decoder, imported anew into this process, which is good for nothing else then.
+    """Decoder of the package, imported again into this process.
+
+    The process must not be used for anything else afterwards.
 
     Args:
-        fault: What is wrong with it, if anything.
+        fault: Fault of the decoder; None for none.
     """
 
     def __init__(self, fault: Fault | None) -> None:
@@ -148,7 +158,7 @@ class Decoder:
         self._digest = importlib.import_module(SYMBOLS).digest
 
     def problem(self, case: Case) -> str:
-        """What is wrong with the first of a case's runs that fails; empty if none does."""
+        """Problem of the first run of a case that fails; empty if none does."""
         for number in range(max(len(case.renders), 1)):
             result = judge(case, number, self._decode, ".npy", self._hash)
             if result.problem:
@@ -164,7 +174,7 @@ class Decoder:
 
 
 def _ended(work: Callable[[], Ended]) -> Ended:
-    """How something ends that may end as a program does."""
+    """Calls a function; turns any exception, including `SystemExit`, into exit code 1."""
     try:
         return work()
     except BaseException as error:
@@ -172,7 +182,7 @@ def _ended(work: Callable[[], Ended]) -> Ended:
 
 
 def _confine() -> None:
-    """Plain numpy, no output, a cap on memory."""
+    """Sets plain numpy, no output, and a limit on memory for this process."""
     os.environ["PROXYIMG_NO_KERNEL"] = "1"
     warnings.resetwarnings()
     warnings.simplefilter("ignore")
@@ -184,7 +194,7 @@ def _confine() -> None:
 
 
 def limit_memory() -> None:
-    """Caps what this process may hold, beyond what it does already, at `MEMORY`."""
+    """Limits the memory of this process to `MEMORY` beyond what it holds already."""
     held = Path("/proc/self/statm")
     pages = int(held.read_text().split()[5]) if held.exists() else 0
     data = MEMORY + pages * resource.getpagesize()
@@ -195,7 +205,7 @@ def limit_memory() -> None:
 
 
 class _Finder(importlib.abc.MetaPathFinder):
-    """Finds the module with a fault."""
+    """Finder of the module with a fault."""
 
     def __init__(self, fault: Fault) -> None:
         dotted = fault.file.removesuffix(".py").replace("/", ".")
@@ -212,6 +222,8 @@ class _Finder(importlib.abc.MetaPathFinder):
 
 
 class _Loader(importlib.machinery.SourceFileLoader):
+    """Loader of the module with a fault."""
+
     fault: Fault
 
     def get_code(self, fullname: str) -> CodeType:

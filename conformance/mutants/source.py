@@ -1,4 +1,4 @@
-"""The faults of one file, named, and a fair choice of them.
+"""Mutants of one file, their names, and a fair choice of them.
 
 DeMillo, Lipton, Sayward 1978, "Hints on Test Data Selection".
 """
@@ -15,7 +15,7 @@ from itertools import chain, zip_longest
 from .operators import changes
 
 LONG = 120
-"""Characters of a statement that are shown."""
+"""Most characters of a statement that are printed."""
 
 
 @dataclass(frozen=True)
@@ -26,11 +26,11 @@ class Mutant:
         file: Path within the package.
         function: Qualified name of the function; empty at the level of the module.
         lines: First and last line of the statement, or of the head of a compound one.
-        operator: What kind of fault.
-        before: The statement as it is.
-        after: As it becomes.
+        operator: Name of the mutation operator.
+        before: Text of the statement.
+        after: Text of the changed statement.
         number: Position among all mutants of the file.
-        again: How many mutants before it in the function read the same.
+        again: Number of mutants before it in the function that have the same texts.
     """
 
     file: str
@@ -44,7 +44,7 @@ class Mutant:
 
     @property
     def key(self) -> str:
-        """Names it, whatever else changes in the file."""
+        """Name that does not depend on changes elsewhere in the file."""
         more = f" #{self.again + 1}" if self.again else ""
         return f"{self.file} {self.function or '(module)'}: {self.before} -> {self.after}{more}"
 
@@ -74,19 +74,19 @@ def mutants(file: str, source: str) -> list[Mutant]:
 
 
 def mutated(source: str, number: int) -> ast.Module:
-    """The tree of a source with mutant `number`."""
+    """Syntax tree of a source with mutant `number`."""
     tree = ast.parse(source)
     changes(tree)[number].swap()
     return ast.fix_missing_locations(tree)
 
 
 def choose(found: Sequence[Mutant], count: int, seed: int) -> list[Mutant]:
-    """Some mutants, as evenly from all functions, and in these from all operators, as can be.
+    """Chooses mutants, evenly from all functions, and within a function from all operators.
 
     Args:
-        found: All that there are.
-        count: How many are wanted.
-        seed: Which; what is chosen in a function does not depend on other functions.
+        found: The mutants to choose from.
+        count: Number of mutants to choose.
+        seed: Seed of the choice; the choice within a function does not depend on other functions.
     """
     functions: dict[tuple[str, str], dict[str, list[Mutant]]] = {}
     for m in found:
@@ -103,16 +103,18 @@ def choose(found: Sequence[Mutant], count: int, seed: int) -> list[Mutant]:
 
 
 def _shuffling(*seed: object) -> random.Random:
+    """Random numbers for a seed."""
     return random.Random("/".join(map(str, seed)))
 
 
 def _in_turn(queues: Sequence[Sequence[Mutant]]) -> list[Mutant]:
+    """First items of all queues, then the second ones, and so on."""
     rounds = chain.from_iterable(zip_longest(*queues))
     return [m for m in rounds if m is not None]
 
 
 def _text(statement: ast.stmt) -> str:
-    """A statement, or the head of a compound one, as one line."""
+    """Text of a statement, or of the head of a compound one, in one line."""
     if isinstance(statement, ast.If | ast.While):
         return f"{type(statement).__name__.lower()} {ast.unparse(statement.test)}:"
     if isinstance(statement, ast.For):
@@ -121,7 +123,7 @@ def _text(statement: ast.stmt) -> str:
 
 
 def _shortened(before: str, after: str) -> tuple[str, str]:
-    """Two texts without most of what is the same at their beginning and end, if they are long."""
+    """Shortens two long texts by most of their common beginning and end."""
     if max(len(before), len(after)) <= LONG or after == "pass":
         return before[:LONG], after
     start, end = _alike(before, after), _alike(before[::-1], after[::-1])
@@ -130,12 +132,13 @@ def _shortened(before: str, after: str) -> tuple[str, str]:
 
 
 def _alike(one: str, other: str) -> int:
-    """Number of characters that two texts begin with alike."""
+    """Number of characters in the common beginning of two texts."""
     pairs = enumerate(zip(one, other, strict=False))
     return next((i for i, (a, b) in pairs if a != b), min(len(one), len(other)))
 
 
 def _lines(statement: ast.stmt) -> tuple[int, int]:
+    """First and last line of a statement, or of the head of a compound one."""
     body = getattr(statement, "body", None)
     last = body[0].lineno - 1 if body else statement.end_lineno or statement.lineno
     return statement.lineno, max(last, statement.lineno)

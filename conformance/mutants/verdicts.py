@@ -1,8 +1,8 @@
-"""Whether the suite catches decoders with small faults.
+"""Verdicts on mutants: whether the suite detects decoders with small faults.
 
-Mutation testing of the suite: the decoder's own source is changed in one place, and the cases that
-run that place must notice. A survivor decodes other files too; where it differs from the decoder as
-it is, the suite has a gap.
+This is mutation testing of the suite. The source of the decoder is changed in one place, and the
+cases that run that place must notice. A mutant that survives then decodes other files. If it
+differs from the decoder without a fault on one of these, the suite has a gap.
 """
 
 from __future__ import annotations
@@ -24,30 +24,30 @@ FILES = (
     "render/compose.py", "render/view.py", "render/pixels.py", "render/moment.py",
     "render/neighbours.py", "codec/read.py", "codec/unpack.py", "model.py",
 )  # fmt: skip
-"""What decodes, within the package; of these the lines that the suite runs."""
+"""Files of the package that decode; mutants are made of the lines in them that the suite runs."""
 
 NOT_DRAWN = {
     "container/tree.py", "container/undo.py", "texture/context_native.py",
     "texture/synthesis_native.py",
 }  # fmt: skip
-"""Files that the plain decoder does not need: what a reader may ignore [CON-9], and the kernel."""
+"""Files that the plain decoder does not need: chunks that it may ignore [CON-9], the kernel."""
 
 EQUIVALENT = Path(__file__).with_name("equivalent.json")
-"""Mutants that somebody has looked at and found to be no fault, each with the reason."""
+"""File of mutants that were examined and found to be no fault, each with the reason."""
 
 WANTED = 0.9
-"""Share of faults that the suite must catch."""
+"""Share of faults that the suite must detect."""
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What became of a mutant.
+    """Verdict on a mutant.
 
     Attributes:
         mutant: The mutant.
-        kind: ``caught``, ``equivalent`` if `EQUIVALENT` says so, ``changes`` if a file outside the
-            suite shows the fault, or ``unknown``.
-        why: The case and what it said, or the reason.
+        kind: ``caught``; ``equivalent`` if `EQUIVALENT` says so; ``changes`` if a file outside the
+            suite shows the fault; or ``unknown``.
+        why: The case that failed and its problem, or the reason.
     """
 
     mutant: Mutant
@@ -56,7 +56,7 @@ class Verdict:
 
 
 class Suite:
-    """Cases, and what the decoder does with them as it is."""
+    """Cases, and a record of the decoder without a fault."""
 
     def __init__(self, cases: Sequence[Case]) -> None:
         self.cases = cases
@@ -67,7 +67,7 @@ class Suite:
         return bool(self.record.of(mutant.file, *mutant.lines))
 
     def catches(self, mutant: Mutant) -> Caught | None:
-        """The first case that fails, quick ones first, of those that run the place."""
+        """First case that a mutant fails, of those that run its place; quick ones come first."""
         names = self.record.of(mutant.file, *mutant.lines)
         concerned = sorted(
             (case for case in self.cases if case.name in names),
@@ -77,14 +77,14 @@ class Suite:
 
 
 def fault(mutant: Mutant) -> Fault:
-    """The module of a mutant."""
+    """Module of a mutant."""
     path = ROOT / mutant.file
     tree = mutated(path.read_text("utf-8"), mutant.number)
     return Fault(mutant.file, compile(tree, str(path), "exec"))
 
 
 def all_mutants(pattern: str = "*") -> list[Mutant]:
-    """All mutants of `FILES` whose path matches."""
+    """All mutants of `FILES` whose path matches a pattern."""
     paths = sorted({path for name in FILES for path in ROOT.glob(name)})
     names = [path.relative_to(ROOT).as_posix() for path in paths]
     return [
@@ -98,7 +98,14 @@ def all_mutants(pattern: str = "*") -> list[Mutant]:
 def judged(
     chosen: Iterable[Mutant], suite: Suite, more: Callable[[], Suite], say: Callable[[str], None]
 ) -> list[Verdict]:
-    """The verdict on each mutant; `more` makes files outside the suite, if they are needed."""
+    """Judges mutants.
+
+    Args:
+        chosen: The mutants.
+        suite: The suite.
+        more: Function that makes files outside the suite; called if they are needed.
+        say: Function that prints a verdict.
+    """
     known: dict[str, str] = json.loads(EQUIVALENT.read_text("utf-8"))
     others: Suite | None = None
     verdicts = []
@@ -122,7 +129,15 @@ def judged(
 
 
 def summary(verdicts: Sequence[Verdict], missed: int, places: int) -> tuple[str, float]:
-    """Figures for people, and the share caught of what is not known to be equivalent."""
+    """Text with the numbers of verdicts, and the share of mutants caught.
+
+    The share is of the mutants that are not known to be equivalent.
+
+    Args:
+        verdicts: The verdicts.
+        missed: Number of mutants that the suite does not run, in functions that it runs.
+        places: Number of all mutants in these functions.
+    """
     count = Counter(verdict.kind for verdict in verdicts)
     faults = len(verdicts) - count["equivalent"]
     share = count["caught"] / faults if faults else 1.0

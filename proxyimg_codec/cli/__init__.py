@@ -1,1 +1,1 @@
-"""Command-line tools, one module each."""
+"""Command-line tools, one module for each."""

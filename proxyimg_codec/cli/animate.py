@@ -1,4 +1,7 @@
-"""pxi-animate: layers of a .pxi picture move; a clip, or a .pxi file that carries the motion."""
+"""pxi-animate: moves the layers of a .pxi picture.
+
+The result is a clip, or a .pxi file that carries the motion.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +28,7 @@ Transparency is kept by all but .mp4; .gif knows clear and opaque only.
 
 
 def arguments() -> argparse.ArgumentParser:
-    """The command line."""
+    """Parser of the command line."""
     p = parser(
         "pxi-animate",
         "Let layers of a .pxi picture move: by a preset, by a motion file, or as the picture "
@@ -70,7 +73,11 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def animate_file(args: argparse.Namespace) -> None:
-    """Does what the command line asks for."""
+    """Runs pxi-animate with parsed arguments.
+
+    Raises:
+        PxiError: Anything that goes wrong, as the class that decides the exit code.
+    """
     clip = Path(args.output).suffix.lower() != ".pxi"
     check(args, clip)
 
@@ -90,11 +97,15 @@ def animate_file(args: argparse.Namespace) -> None:
 
 
 def check(args: argparse.Namespace, clip: bool) -> None:
-    """Refuses what makes no sense, before any work.
+    """Refuses contradictory arguments before any work is done.
+
+    Args:
+        args: The parsed command line.
+        clip: Whether the output is a clip rather than a .pxi file.
 
     Raises:
-        UsageError: A flag that would do nothing, or a target of an unknown kind.
-        InputError: The target exists, or cannot be written.
+        UsageError: A flag would have no effect, or the kind of the target is unknown.
+        InputError: The target exists and --force is not given, or it cannot be written.
     """
     if args.preset and args.motion:
         raise UsageError("give --preset or --motion, not both")
@@ -121,7 +132,7 @@ def check(args: argparse.Namespace, clip: bool) -> None:
 
 
 def moving(image: Image, args: argparse.Namespace) -> Image:
-    """The picture with the motion that was asked for."""
+    """Returns the image with the motion that the command line asks for."""
     motion = motion_of(image, args)
     bar: Any = None
 
@@ -138,7 +149,7 @@ def moving(image: Image, args: argparse.Namespace) -> Image:
 
 
 def motion_of(image: Image, args: argparse.Namespace) -> Motion:
-    """The motion of the preset or file, with what the flags change."""
+    """Motion of the preset or the motion file, as changed by the flags."""
     from ..animate.animate import boxes, preset
     from ..animate.motion import Motion
 
@@ -155,10 +166,13 @@ def motion_of(image: Image, args: argparse.Namespace) -> Motion:
 
 
 def spot(text: str) -> Any:
-    """A side, a disc or a rectangle of a layer.
+    """Parses a value of --pin: a named side, a disc or a rectangle.
+
+    Returns:
+        The name of the side, a `Disc` or a `Rectangle`.
 
     Raises:
-        UsageError: It is none.
+        UsageError: The text is none of these.
     """
     from ..animate.motion import Disc, Rectangle
 
@@ -177,7 +191,7 @@ def spot(text: str) -> Any:
 
 
 def write_picture(image: Image, args: argparse.Namespace) -> str:
-    """Writes the picture with its motion; says what that is."""
+    """Writes the picture with its motion; returns a sentence about it for the user."""
     from ..animate.animate import amplitude
     from ..codec.write import to_bytes
     from ..io.files import write_atomically
@@ -193,7 +207,7 @@ def write_picture(image: Image, args: argparse.Namespace) -> str:
 
 
 def write_clip(image: Image, args: argparse.Namespace) -> str:
-    """Renders and writes the clip; says what it is."""
+    """Renders and writes the clip; returns a sentence about it for the user."""
     from ..animate.sequence import frames, times
     from ..export import clip
 
@@ -228,10 +242,12 @@ def write_clip(image: Image, args: argparse.Namespace) -> str:
 
 
 def size_of(text: str | None, image: Image) -> tuple[int, int]:
-    """Width and height of the frames.
+    """Parses --size: width and height of the frames in pixels; the canvas's by default.
+
+    If only a width is given, the height follows from the aspect ratio of the canvas.
 
     Raises:
-        UsageError: Not a size.
+        UsageError: The text is not a size.
     """
     from ..render.view import make_view
 
@@ -247,10 +263,10 @@ def size_of(text: str | None, image: Image) -> tuple[int, int]:
 
 
 def colour(text: str | None) -> tuple[int, int, int]:
-    """Red, green and blue.
+    """Parses --background: red, green and blue, 0 to 255; white by default.
 
     Raises:
-        UsageError: Not six hexadecimal digits.
+        UsageError: The text does not have six hexadecimal digits.
     """
     if text is None:
         return (255, 255, 255)

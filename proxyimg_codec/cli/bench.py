@@ -1,4 +1,4 @@
-"""pxi-bench: our codec beside others, measured."""
+"""pxi-bench: measures this codec beside others."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Pictures with transparency are judged on black and on white; codecs without it l
 
 
 def arguments() -> argparse.ArgumentParser:
-    """The command line."""
+    """Parser of the command line."""
     p = parser("pxi-bench", "Measure the codec beside others.")
     rd = p.add_subparsers(dest="benchmark", required=True, metavar="BENCHMARK").add_parser(
         "rd", prog="pxi-bench", usage="pxi-bench rd [options] FOLDER", allow_abbrev=False,
@@ -64,7 +64,16 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def rate_distortion(args: argparse.Namespace, command: str) -> None:
-    """Does what the command line asks for."""
+    """Runs the benchmark ``rd``.
+
+    Args:
+        args: The parsed command line.
+        command: The command line as text, for the report.
+
+    Raises:
+        UsageError: Arguments contradict each other or are out of range.
+        InputError: Some measurements failed, or results cannot be read or written.
+    """
     from ..bench import rd, report
     from ..bench.rows import read_csv
 
@@ -112,10 +121,10 @@ def rate_distortion(args: argparse.Namespace, command: str) -> None:
 
 
 def folder_of(args: argparse.Namespace) -> Path:
-    """The folder of pictures.
+    """Folder of the pictures, given by position or as --dataset.
 
     Raises:
-        UsageError: Given twice, or not at all.
+        UsageError: It is given twice, or not at all.
     """
     given = [f for f in (args.folder, args.dataset) if f is not None]
     if len(given) != 1:
@@ -124,10 +133,10 @@ def folder_of(args: argparse.Namespace) -> Path:
 
 
 def check_out(out: Path, args: argparse.Namespace) -> None:
-    """Refuses to replace results, but for the ones that are reused.
+    """Refuses to replace earlier results, except those that --reuse continues.
 
     Raises:
-        InputError: There are some, or the folder cannot be made.
+        InputError: The folder holds other results, or cannot be made.
     """
     path = out / "rd.csv"
     if path.exists() and not args.force:
@@ -141,10 +150,10 @@ def check_out(out: Path, args: argparse.Namespace) -> None:
 
 
 def choose(args: argparse.Namespace) -> list[Codec]:
-    """The codecs that the flags ask for, with their qualities.
+    """Codecs that the flags ask for, with their qualities.
 
     Raises:
-        UsageError: An unknown name, or a quality that a codec does not know.
+        UsageError: A codec is unknown, an effort or quality is out of range, or --masks is missing.
     """
     from dataclasses import replace
 
@@ -177,10 +186,10 @@ def choose(args: argparse.Namespace) -> list[Codec]:
 
 
 def parse_range(text: str) -> tuple[float, float]:
-    """LOW,HIGH in bits a pixel.
+    """Parses --range: the lower and the upper bound in bits a pixel.
 
     Raises:
-        UsageError: Something else.
+        UsageError: The text is not LOW,HIGH with 0 <= LOW < HIGH.
     """
     try:
         low, high = (float(part) for part in text.split(","))

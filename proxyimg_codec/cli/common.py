@@ -1,4 +1,4 @@
-"""What the tools share: exit codes, refusal to overwrite, progress."""
+"""Helpers of all tools: exit codes, limits, checks of output files, progress bars."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ EXIT_CODES = """exit codes:
 
 
 def parser(prog: str, description: str) -> argparse.ArgumentParser:
-    """An argument parser in the style of all tools."""
+    """Creates an argument parser in the style of all tools."""
     p = argparse.ArgumentParser(
         prog, description=description, epilog=EXIT_CODES,
         formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False,
@@ -31,7 +31,7 @@ def parser(prog: str, description: str) -> argparse.ArgumentParser:
 
 
 def add_limits(p: argparse.ArgumentParser) -> None:
-    """Adds the option of all tools that read `.pxi` files."""
+    """Adds the option --limit, which all tools have that read `.pxi` files."""
     p.add_argument(
         "--limit", metavar="NAME=VALUE", action="append", default=[],
         help="change a limit on what files may ask for, such as layers=2000; may be repeated",
@@ -39,10 +39,10 @@ def add_limits(p: argparse.ArgumentParser) -> None:
 
 
 def limits_of(args: argparse.Namespace) -> Limits:
-    """The limits that the options ask for.
+    """Limits that the options --limit ask for.
 
     Raises:
-        UsageError: A limit that does not exist, or is not a whole number.
+        UsageError: A limit does not exist, or its value is not a whole number.
     """
     names = [f.name for f in fields(Limits)]
     changes = {}
@@ -57,9 +57,17 @@ def limits_of(args: argparse.Namespace) -> Limits:
 
 
 def run(prog: str, work: Callable[[], None]) -> int:
-    """Runs a tool; errors become one line on stderr and an exit code."""
+    """Runs a tool, and turns its errors into one line on stderr and an exit code.
+
+    Args:
+        prog: Name of the tool in error messages.
+        work: The work to do.
+
+    Returns:
+        The exit code.
+    """
     if isinstance(sys.stdout, io.TextIOWrapper):
-        # Names of layers may hold what the terminal cannot show.
+        # Names of layers may have characters that the terminal cannot show.
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
         work()
@@ -72,7 +80,7 @@ def run(prog: str, work: Callable[[], None]) -> int:
     except MemoryError:
         code, message = 6, "not enough memory; ask for a smaller picture or region"
     except BrokenPipeError:
-        # The reader of our output has gone; there is nobody left to tell.
+        # The reader of the output is gone, so that nobody would see a message.
         code, message = 3, ""
     except ModuleNotFoundError as error:
         if (error.name or "").startswith("proxyimg_codec"):
@@ -88,18 +96,18 @@ def run(prog: str, work: Callable[[], None]) -> int:
 
 
 def key(name: str) -> str | int:
-    """A layer's address: digits are an index, everything else a name."""
+    """Parses the address of a layer: digits are a position, anything else is a name."""
     digits = name.removeprefix("-")
     return int(name) if digits.isdecimal() and len(digits) < 10 else name
 
 
 def printable(text: str) -> str:
-    """Text of a file for a terminal: nothing in it controls that."""
+    """Makes text of a file safe for a terminal by escaping control characters."""
     return text if text.isprintable() else ascii(text)
 
 
 def _drop_output() -> None:
-    """Forgets output that cannot be written, which Python would complain about at its end."""
+    """Discards output that cannot be written, about which Python would complain on exit."""
     try:
         print(end="", flush=True)
     except OSError:
@@ -107,7 +115,11 @@ def _drop_output() -> None:
 
 
 def default_target(source: str, suffix: str) -> str:
-    """Where the output of `source` goes if the user does not say.
+    """Name of the output file if the user gives none: the input with another suffix.
+
+    Args:
+        source: Name of the input, or ``-``.
+        suffix: Suffix of the output, with the dot.
 
     Raises:
         InputError: `source` is not the name of a file.
@@ -121,12 +133,17 @@ def default_target(source: str, suffix: str) -> str:
 
 
 def check_target(path: str, force: bool, source: str | None = None) -> None:
-    """Refuses a target that exists, is the source, or whose folder does not exist.
+    """Refuses an output file that exists, is the input, or whose folder does not exist.
 
-    Pipes and devices may exist: writing to them replaces nothing.
+    Pipes and devices may exist, because writing to them replaces nothing.
+
+    Args:
+        path: Name of the output, or ``-``.
+        force: Whether an existing file may be replaced.
+        source: Name of the input, or ``-``.
 
     Raises:
-        UsageError: Input and output are the same file.
+        UsageError: Input and output are the same file, or the output is a terminal.
         InputError: The file exists and `force` is off, or its folder is missing.
     """
     if path == "-":
@@ -146,7 +163,7 @@ def check_target(path: str, force: bool, source: str | None = None) -> None:
 
 
 class Bar:
-    """A progress bar on a terminal; silent in a pipe, with `quiet`, or without tqdm."""
+    """Progress bar on a terminal; invisible in a pipe, with `quiet`, or without tqdm."""
 
     def __init__(self, total: int, label: str, quiet: bool) -> None:
         self._bar: Any = None
@@ -158,7 +175,7 @@ class Bar:
             self._bar = tqdm(total=total, desc=label, leave=False, unit_scale=True, file=sys.stderr)
 
     def advance(self, count: int) -> None:
-        """Moves the bar on."""
+        """Advances the bar by `count` steps."""
         if self._bar is not None:
             self._bar.update(count)
 

@@ -1,4 +1,4 @@
-"""pxi-decode: a .pxi file becomes a picture of any size, its layers, outlines, or an ONNX model."""
+"""pxi-decode: turns a .pxi file into a picture of any size, layers, outlines or an ONNX model."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from .common import (
 )  # fmt: skip
 
 LAYERED = (".ora", ".svg")
-"""Suffixes of files that hold layers, not one picture."""
+"""Suffixes of output files that hold layers instead of one flat picture."""
 
 DAMAGED = 7
-"""Exit code if a damaged file was decoded as far as it goes."""
+"""Exit code if a damaged file could be decoded only in part."""
 
 
 def arguments() -> argparse.ArgumentParser:
-    """The command line."""
+    """Parser of the command line."""
     p = parser("pxi-decode", "Render a .pxi file at any size and region.")
     p.epilog = f"{EXIT_CODES}  {DAMAGED} damaged, but decoded as far as it goes (--tolerant)\n"
     p.add_argument("input", metavar="IN", help=".pxi file, or - for standard input")
@@ -81,7 +81,14 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def decode_file(args: argparse.Namespace) -> Sequence[str]:
-    """Does what the command line asks for; what was wrong with the input."""
+    """Runs pxi-decode with parsed arguments.
+
+    Returns:
+        Descriptions of the damage in the input; empty for a file that is intact.
+
+    Raises:
+        PxiError: Anything that goes wrong, as the class that decides the exit code.
+    """
     rendering = args.output is not None or args.export_onnx is None
     if args.graph is not None and args.export_onnx is None:
         raise UsageError("--graph needs --export-onnx")
@@ -117,10 +124,10 @@ def decode_file(args: argparse.Namespace) -> Sequence[str]:
 
 
 def refuse_render_flags(args: argparse.Namespace) -> None:
-    """A flag that would do nothing is an error.
+    """Refuses flags that have no effect because no picture is rendered.
 
     Raises:
-        UsageError: A rendering flag was given, but nothing is rendered.
+        UsageError: A rendering flag is given.
     """
     chosen = ("time", "no_background") if args.graph == "full" else ()
     flags = ("scale", "fit", "width", "height", "region", "time", "no_background", "bit_depth")
@@ -133,10 +140,14 @@ def refuse_render_flags(args: argparse.Namespace) -> None:
 
 
 def refuse_for_layers(args: argparse.Namespace, kind: str) -> None:
-    """Files of layers are as large as the canvas, and hold what their format can.
+    """Refuses flags that a file of layers cannot follow; such files have the size of the canvas.
+
+    Args:
+        args: The parsed command line.
+        kind: Suffix of the output in lower case.
 
     Raises:
-        UsageError: A flag was given that such a file cannot follow.
+        UsageError: Such a flag is given.
     """
     if kind not in LAYERED:
         return
@@ -150,7 +161,7 @@ def refuse_for_layers(args: argparse.Namespace, kind: str) -> None:
 
 
 def target(args: argparse.Namespace) -> str:
-    """Where the picture goes."""
+    """Name of the output picture."""
     return default_target(args.input, ".png") if args.output is None else str(args.output)
 
 
@@ -158,7 +169,7 @@ def export(image: Any, args: argparse.Namespace) -> None:
     """Writes an ONNX model of the picture.
 
     Raises:
-        UsageError: There is no such model of it.
+        UsageError: The picture has no such model.
     """
     from ..io.files import write_atomically
 
@@ -175,10 +186,10 @@ def export(image: Any, args: argparse.Namespace) -> None:
 
 
 def texture_model(image: Any, args: argparse.Namespace) -> Any:
-    """The network or the synthesis of all layers, or of those that were asked for.
+    """ONNX model of the one decoder network, or of the one synthesis, of the chosen layers.
 
     Raises:
-        UsageError: They have several.
+        UsageError: The layers have several networks or planes.
     """
     from ..export import onnx_network, onnx_synthesis
 
@@ -193,7 +204,7 @@ def texture_model(image: Any, args: argparse.Namespace) -> Any:
 
 
 def selected(image: Any, names: list[str] | None) -> list[Any]:
-    """The layers of --layer, all by default."""
+    """Layers that --layer names; all by default."""
     return [image.layers[key(n)] for n in names] if names else list(image.layers)
 
 
@@ -255,10 +266,10 @@ def layered(image: Any, output: str, kind: str, args: argparse.Namespace) -> Non
 
 
 def parse_region(text: str | None) -> tuple[int, int, int, int] | None:
-    """X,Y,W,H as integers.
+    """Parses --region: x, y, width and height in canvas pixels, or None.
 
     Raises:
-        UsageError: Not four integers.
+        UsageError: The text is not four integers.
     """
     if text is None:
         return None

@@ -1,4 +1,4 @@
-"""pxi-edit: change the objects of a .pxi picture; nothing is encoded anew."""
+"""pxi-edit: changes the objects of a .pxi picture without encoding anything anew."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def arguments() -> argparse.ArgumentParser:
-    """The command line; edits gather in `edits`, in their order."""
+    """Parser of the command line; its result has a list `edits` in the order of the flags."""
     p = parser(
         "pxi-edit",
         "Edit the layers of a .pxi picture. Edits are repeatable and done in their order; "
@@ -48,12 +48,16 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _guarded(words: list[str]) -> list[str]:
-    """Words such as -5,3 with a leading space, so that argparse does not take them for flags."""
+    """Puts a space before words such as -5,3, so that argparse does not take them for flags."""
     return [f" {w}" if re.match(r"-\.?[0-9]", w) else w for w in words]
 
 
 def edit_file(args: argparse.Namespace) -> None:
-    """Does what the command line asks for."""
+    """Runs pxi-edit with parsed arguments.
+
+    Raises:
+        PxiError: Anything that goes wrong, as the class that decides the exit code.
+    """
     _check(args)
     operations = [edit.values() for edit in args.edits]
 
@@ -76,11 +80,11 @@ def edit_file(args: argparse.Namespace) -> None:
 
 
 def _check(args: argparse.Namespace) -> None:
-    """Refuses what makes no sense, before any work.
+    """Refuses contradictory arguments before any work is done.
 
     Raises:
         UsageError: OUT is missing, or standard output is needed twice.
-        InputError: OUT exists already, or cannot be written.
+        InputError: OUT exists and --force is not given, or it cannot be written.
     """
     if args.output is None and (args.edits or args.bake or not args.list):
         raise UsageError("OUT is missing; --list alone needs none")
@@ -92,7 +96,10 @@ def _check(args: argparse.Namespace) -> None:
 
 
 def _edited(picture: Picture, operations: Sequence[Values]) -> Picture:
-    """The picture after all operations; errors count them, those of scripts one by one."""
+    """Applies all operations to a picture.
+
+    Error messages count the operations from 1; each operation of a script counts by itself.
+    """
     from ..edit.history import undone
     from ..edit.script import apply
 
@@ -108,7 +115,7 @@ def _edited(picture: Picture, operations: Sequence[Values]) -> Picture:
 
 
 def _report(args: argparse.Namespace, picture: Picture, size: int, seconds: float) -> None:
-    """Prints what was written: a file of `size` bytes."""
+    """Prints a report about the written file, which has `size` bytes."""
     if args.json and not args.list:
         report = {
             "output": args.output,
@@ -127,7 +134,7 @@ def _report(args: argparse.Namespace, picture: Picture, size: int, seconds: floa
 
 
 def listing(picture: Picture) -> dict[str, Any]:
-    """Layers, groups and history, ready for JSON."""
+    """Facts about layers, groups and history, ready for JSON."""
     return {
         "layers": [_layer(picture, i) for i in range(len(picture.layers))],
         "groups": dict(picture.groups),
@@ -136,7 +143,7 @@ def listing(picture: Picture) -> dict[str, Any]:
 
 
 def _layer(picture: Picture, position: int) -> dict[str, Any]:
-    """Facts about a layer."""
+    """Facts about the layer at a position."""
     from ..edit.transforms import bounds
 
     layer = picture.layers[position]
@@ -159,7 +166,10 @@ def _layer(picture: Picture, position: int) -> dict[str, Any]:
 
 
 def _recorded(operation: str) -> Any:
-    """An operation of a history; as it is, if another program wrote it in its own way."""
+    """Parses an operation of the history; returns the text itself if it is not JSON.
+
+    Another program may have written it in a form of its own.
+    """
     try:
         return json.loads(operation)
     except (ValueError, RecursionError):
@@ -167,7 +177,7 @@ def _recorded(operation: str) -> Any:
 
 
 def text(facts: dict[str, Any]) -> str:
-    """The facts for people."""
+    """Formats the facts of `listing` as text."""
     lines = []
     for v in facts["layers"]:
         x0, y0, x1, y1 = v["bounds"]

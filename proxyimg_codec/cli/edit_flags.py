@@ -1,4 +1,4 @@
-"""The flags of pxi-edit that are edits: words of the command line become operations."""
+"""Flags of pxi-edit that are edits: turns words of the command line into operations."""
 
 from __future__ import annotations
 
@@ -11,21 +11,27 @@ from ..errors import UsageError
 from .common import key
 
 Values = dict[str, Any]
-"""An operation; or ``{"script": operations}`` or ``{"undo": count}``."""
+"""An edit operation, ``{"script": operations}`` or ``{"undo": count}``."""
 
 
 class Edit(NamedTuple):
-    """An edit of the command line: its flag, what reads its words, and the words."""
+    """Edit on the command line.
+
+    Attributes:
+        flag: The flag, such as ``--move``.
+        parse: Function that turns the words into an operation.
+        words: The words after the flag.
+    """
 
     flag: str
     parse: Callable[..., Values]
     words: list[str]
 
     def values(self) -> Values:
-        """What is to be done.
+        """Parses the words.
 
         Raises:
-            UsageError: The words make no sense.
+            UsageError: The words cannot be understood.
         """
         try:
             return self.parse(*(w.strip() if w.startswith(" -") else w for w in self.words))
@@ -35,13 +41,15 @@ class Edit(NamedTuple):
 
 
 class Flag(NamedTuple):
-    """A flag.
+    """Flag of the command line that is an edit.
 
     Attributes:
-        name: As it is written.
-        parse: From its words to what is to be done; raises `ValueError` or `TypeError`.
-        words: How help calls them; a last one that ends in `` ...`` may be many or none.
-        help: A phrase.
+        name: The flag as it is written, such as ``--move``.
+        parse: Function that turns the words after the flag into an operation; it raises
+            `ValueError` or `TypeError` if it cannot.
+        words: Names of the words in the help; a last name that ends in `` ...`` stands for any
+            number of words.
+        help: Text of the help, a phrase.
     """
 
     name: str
@@ -50,7 +58,7 @@ class Flag(NamedTuple):
     help: str
 
     def add(self, edits: argparse._ArgumentGroup) -> None:
-        """Adds the flag to a command line whose `edits` gathers them, in their order."""
+        """Adds the flag to a parser; its result collects all edits in `edits`, in their order."""
         flag, parse = self.name, self.parse
 
         class Gather(argparse.Action):
@@ -68,7 +76,7 @@ class Flag(NamedTuple):
 
 
 def add_edits(p: argparse.ArgumentParser) -> None:
-    """Adds all flags; `edits` of what is parsed has a list of `Edit`."""
+    """Adds all flags to a parser; its result has a list of `Edit` in `edits`."""
     p.set_defaults(edits=[])
     group = p.add_argument_group("edits")
     for flag in FLAGS:
@@ -76,6 +84,7 @@ def add_edits(p: argparse.ArgumentParser) -> None:
 
 
 def _floats(text: str, count: int) -> list[float]:
+    """Parses exactly `count` numbers that are separated by commas."""
     values = [float(v) for v in text.split(",")]
     if len(values) != count:
         raise ValueError
@@ -83,12 +92,16 @@ def _floats(text: str, count: int) -> list[float]:
 
 
 def _pivoted(text: str) -> tuple[str, Values]:
-    """What stands before @X,Y, and the pivot if there is one."""
+    """Splits VALUE@X,Y into the value and the parameter `pivot`, if there is one."""
     value, at, place = text.partition("@")
     return value, {"pivot": _floats(place, 2)} if at else {}
 
 
 def _geometry(op: str, **parameter: int) -> Callable[[str, str], Values]:
+    """Function that parses NAME and numbers for operation `op`.
+
+    The one keyword argument is the name of the parameter and its count of numbers.
+    """
     ((name, count),) = parameter.items()
 
     def parse(layer: str, value: str) -> Values:
@@ -127,10 +140,13 @@ def _point(layer: str, which: str, by: str) -> Values:
 
 
 def _named(op: str) -> Callable[[str], Values]:
+    """Function that parses NAME for operation `op`."""
     return lambda layer: {"op": op, "layer": key(layer)}
 
 
 def _assigned(op: str, name: str) -> Callable[[str], Values]:
+    """Function that parses NAME=VALUE, or NAME alone, for operation `op` with parameter `name`."""
+
     def parse(text: str) -> Values:
         layer, given, value = text.rpartition("=") if "=" in text else (text, "", "")
         return {"op": op, "layer": key(layer), **({name: value} if given else {})}

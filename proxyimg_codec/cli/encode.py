@@ -1,4 +1,4 @@
-"""pxi-encode: a picture, flat or in layers, becomes a .pxi file."""
+"""pxi-encode: turns a picture, flat or in layers, into a .pxi file."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PRESET_NAMES = ("fast", "default", "best", "paper")
 
 
 def arguments() -> argparse.ArgumentParser:
-    """The command line."""
+    """Parser of the command line."""
     p = parser(
         "pxi-encode", "Encode a picture as .pxi: layers, Bézier boundaries, fitted textures."
     )
@@ -38,7 +38,7 @@ def arguments() -> argparse.ArgumentParser:
 
 
 def _add_aims(p: argparse.ArgumentParser) -> None:
-    """What the file should be like, and how much time that may take."""
+    """Adds the flags for quality, size and effort."""
     add = p.add_argument
     add("-q", "--quality", type=float, metavar="0-100", help="default 50")
     add("--target-bpp", type=float, metavar="B", help="bits a pixel of the whole file, hit within "
@@ -58,7 +58,7 @@ def _add_aims(p: argparse.ArgumentParser) -> None:
 
 
 def _add_decomposition(p: argparse.ArgumentParser) -> None:
-    """What the layers are."""
+    """Adds the flags that decide about layers, boundaries and meshes."""
     add = p.add_argument
     add("--masks", metavar="PATH", help="folder of mask PNGs, or one label PNG: the layers to make")
     add("--max-layers", type=int, metavar="N", help="most layers found; default 4")
@@ -76,7 +76,7 @@ def _add_decomposition(p: argparse.ArgumentParser) -> None:
 
 
 def _add_details(p: argparse.ArgumentParser) -> None:
-    """How codes are stored, and where the work is done."""
+    """Adds the flags for the storage of codes, for threads and for the device."""
     add = p.add_argument
     add("--feature-bits", type=int, metavar="2-8", help="bits a code; from quality by default")
     add("--net-bits", type=int, metavar="2-8", help="bits a network weight; default 8; "
@@ -94,7 +94,11 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def encode_file(args: argparse.Namespace) -> None:
-    """Does what the command line asks for."""
+    """Runs pxi-encode with parsed arguments.
+
+    Raises:
+        PxiError: Anything that goes wrong, as the class that decides the exit code.
+    """
     from ..errors import UsageError
 
     output = target(args)
@@ -117,7 +121,8 @@ def encode_file(args: argparse.Namespace) -> None:
         bar.close()
     data = to_bytes(image)
 
-    # Of the file as it will be read, before it takes the place of an older one.
+    # The file is decoded again before it replaces an older one, so that a file that cannot be read
+    # replaces nothing.
     quality = psnr(original, from_bytes(data))
     write_atomically(output, data)
     report = {
@@ -139,7 +144,17 @@ def encode_file(args: argparse.Namespace) -> None:
 
 
 def encoded(source: bytes, args: argparse.Namespace, settings: Any, bar: Bar) -> tuple[Any, Any]:
-    """The image of a picture file in memory, and the pixels that it should show."""
+    """Encodes a picture file.
+
+    Args:
+        source: Bytes of the file.
+        args: The parsed command line.
+        settings: `Settings` of the encoder.
+        bar: Progress bar.
+
+    Returns:
+        The encoded picture, and the original pixels [H, W, C] to compare it with.
+    """
     from ..encoder.encode import encode
     from ..encoder.import_layers import composite, encode_layers
     from ..encoder.openraster import is_openraster, read_openraster
@@ -173,15 +188,17 @@ def encoded(source: bytes, args: argparse.Namespace, settings: Any, bar: Bar) ->
 
 
 def target(args: argparse.Namespace) -> str:
-    """Where the output goes."""
+    """Name of the output file."""
     return default_target(args.input, ".pxi") if args.output is None else str(args.output)
 
 
 def refuse_for_layers(args: argparse.Namespace) -> None:
-    """A picture in layers is not decomposed, and hides nothing that would have to be guessed.
+    """Refuses flags about decomposition, which an input in layers does not need.
+
+    Its layers are kept, and they hide nothing that would have to be completed.
 
     Raises:
-        UsageError: A flag that says how to do that was given.
+        UsageError: Such a flag is given.
     """
     from ..errors import UsageError
 
@@ -194,7 +211,7 @@ def refuse_for_layers(args: argparse.Namespace) -> None:
 
 
 def settings_from(args: argparse.Namespace) -> Any:
-    """`Settings` of a command line.
+    """`Settings` of the encoder for a command line.
 
     Raises:
         UsageError: A value is out of range, or flags contradict each other.
@@ -222,7 +239,7 @@ def settings_from(args: argparse.Namespace) -> Any:
 
 
 def describe(report: dict[str, Any]) -> str:
-    """One line for people."""
+    """Formats the report as one line."""
     names = ", ".join(report["layers"])
     quality = "exact" if report["psnr"] is None else f"{report['psnr']:.2f} dB"
     return (

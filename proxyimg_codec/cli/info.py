@@ -1,4 +1,4 @@
-"""pxi-info: what a .pxi file holds. Needs neither numpy nor the pixels."""
+"""pxi-info: describes a .pxi file. It needs neither numpy nor the pixels."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from .common import add_limits, limits_of, parser, printable, run
 
 CODERS = {texr.IMPLICIT: "implicit", texr.PYRAMID: "pyramid"}
 VIEWED = ("grid", "bits", "network", "planes", "part", "cuts")
-"""Fields of textures that are told as they are; a coder has not all of them."""
+"""Fields of textures that are printed unchanged; each coder has only some of them."""
 
 SAMPLINGS = ("direct", "node", "node, local only", "node, global only")
 
 
 def arguments() -> argparse.ArgumentParser:
-    """The command line."""
+    """Parser of the command line."""
     p = parser("pxi-info", "Describe a .pxi file.")
     p.add_argument("input", metavar="IN", help=".pxi file, or - for standard input")
     add_limits(p)
@@ -38,7 +38,11 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def show(args: argparse.Namespace) -> None:
-    """Prints the description."""
+    """Prints the description of a file.
+
+    Raises:
+        PxiError: The file cannot be read.
+    """
     limits = limits_of(args)
     data = read_bytes(args.input)
     facts = describe(parse(data, limits), len(data))
@@ -46,7 +50,12 @@ def show(args: argparse.Namespace) -> None:
 
 
 def describe(c: Container, size: int) -> dict[str, Any]:
-    """Facts about a file of `size` bytes, ready for JSON."""
+    """Facts about a file, ready for JSON.
+
+    Args:
+        c: The parsed file.
+        size: Its size in bytes.
+    """
     width, height = c.head["size"]
     return {
         "version": f"{VERSION[0]}.{VERSION[1]}",
@@ -132,7 +141,7 @@ def _bytes(fields: Mapping[str, Any] | None) -> int:
 
 
 def _motion(c: Container) -> dict[str, Any] | None:
-    """What mOTN says, short of its numbers; None for a picture that does not move."""
+    """Facts about the motion of a picture without its curves; None if it has no motion."""
     m = c.motion
     if m is None:
         return None
@@ -150,7 +159,7 @@ def _motion(c: Container) -> dict[str, Any] | None:
 
 
 def _pose(fields: Mapping[str, Any]) -> list[str]:
-    """What a pose does."""
+    """Words for what a pose changes, such as ``moved`` and ``bent``."""
     return [
         name
         for name, done in (
@@ -166,7 +175,7 @@ def _pose(fields: Mapping[str, Any]) -> list[str]:
 
 
 def settings(c: Container) -> Any:
-    """The encoder's settings, if the file tells and they are valid JSON."""
+    """Settings of the encoder; None if the file has none, or they are not valid JSON."""
     try:
         return json.loads(c.info["settings"]) if c.info else None
     except (ValueError, RecursionError):
@@ -174,7 +183,7 @@ def settings(c: Container) -> Any:
 
 
 def text(f: dict[str, Any]) -> str:
-    """The facts for people."""
+    """Formats the facts of `describe` as text."""
     alpha = "with transparency" if f["alpha"] else "opaque"
     chunks = ", ".join(f"{name} {size}" for name, size in f["chunk_bytes"].items())
     lines = [

@@ -1,7 +1,8 @@
-"""pxi-validate: whether .pxi files are valid, and what is odd about them.
+"""pxi-validate: checks whether .pxi files are valid, and warns of oddities.
 
-Errors have the id of the statement of the specification that is broken, such as CON-6; SEC-2 is a
-limit of this program. Warnings and notes are VAL-1, VAL-2 and so on: see `doubts.CODES`.
+Errors have the id of the statement of the specification that is broken, such as CON-6; SEC-2 stands
+for a limit of this program. Warnings and notes have the codes VAL-1, VAL-2 and so on;
+`warnings.CODES` lists them.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ RESULTS: dict[str, type[PxiError] | None] = {
     "unreadable": InputError,
     "valid": None,
 }
-"""What a file can be, the worst first, and what is raised for it."""
+"""Results of a check, the worst first, with the error that each raises."""
 
 EPILOG = "of several files the worst counts: 4, 5, 6, 3\n\nwarnings and notes:\n" + "\n".join(
     f"  {code:6} {meaning}" for code, meaning in CODES.items()
@@ -35,7 +36,7 @@ EPILOG = "of several files the worst counts: 4, 5, 6, 3\n\nwarnings and notes:\n
 
 
 def arguments() -> argparse.ArgumentParser:
-    """The command line."""
+    """Parser of the command line."""
     p = parser("pxi-validate", "Check .pxi files completely.")
     p.epilog = f"{p.epilog}{EPILOG}"
     p.add_argument("input", metavar="IN", nargs="+", help=".pxi file, or - for standard input")
@@ -52,10 +53,11 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def check(args: argparse.Namespace) -> None:
-    """Prints what is found.
+    """Checks the files and prints the issues that were found.
 
     Raises:
-        PxiError: A file is not valid, in the class of the worst; or, if asked for, has warnings.
+        PxiError: A file is not valid; the class is that of the worst result. With --strict,
+            warnings raise FormatError.
     """
     limits = limits_of(args)
     reports = [report(path, limits) for path in args.input]
@@ -73,7 +75,7 @@ def check(args: argparse.Namespace) -> None:
 
 
 def report(path: str, limits: Limits) -> dict[str, Any]:
-    """What is found in a file, ready for JSON."""
+    """Checks a file; returns the result and its issues, ready for JSON."""
     try:
         issues, profile, level = validate.report(read_bytes(path), limits)
     except InputError as error:
@@ -91,7 +93,7 @@ def report(path: str, limits: Limits) -> dict[str, Any]:
 
 
 def text(report: dict[str, Any]) -> str:
-    """The report on a file for people."""
+    """Formats the report on a file as text."""
     counts = Counter(v["severity"] for v in report["issues"])
     total = ", ".join(f"{n} {name}{'s' * (n > 1)}" for name, n in counts.items())
     fits = f", {report['profile']}, level {report['level']}" if report["level"] else ""

@@ -1,1 +1,1 @@
-"""Editing: operations on the decoded model."""
+"""Editing: operations that turn one decoded picture into another."""

@@ -1,4 +1,4 @@
-"""Operations on how layers are shown: opacity, colour, texture (ProxyImg, equation 5)."""
+"""Operations on the appearance of layers: opacity, colour, texture (ProxyImg, equation 5)."""
 
 from __future__ import annotations
 
@@ -55,6 +55,7 @@ def still(picture: Picture, layer: str | int) -> Picture:
 
 
 def _posed(picture: Picture, target: str | int, **values: Any) -> Picture:
+    """Picture in which a layer, or the layers of a group, have other values in their poses."""
     layers = shown_together(picture, target)
     return substituted(picture, [replace(v, pose=replace(v.pose, **values)) for v in layers])
 
@@ -72,7 +73,21 @@ def recolour(
     tint: str | None = None,
     matrix: Sequence[float] | None = None,
 ) -> Picture:
-    """Changes the colours of a layer, in the order of the parameters, on top of earlier changes."""
+    """Changes the colours of a layer, in the order of the parameters, on top of earlier changes.
+
+    Args:
+        picture: The picture.
+        layer: Name or position of a layer, or name of a group.
+        hue: Rotation of the hue in degrees.
+        saturation: Factor of the saturation; 0 gives grey.
+        brightness: Factor of red, green and blue.
+        tint: ``#rrggbb``; colours become shades of it, by luminance. None for none.
+        matrix: The 12 entries of a 3 x 4 matrix, row by row, applied to (red, green, blue, 1) in
+            0..1; None for none.
+
+    Raises:
+        UsageError: An entry of the resulting matrix exceeds 256.
+    """
     change = np.eye(4)
     steps = [_hue(hue), _saturation(saturation), np.eye(3) * brightness]
     if tint is not None:
@@ -121,7 +136,19 @@ def texture(
     from_layer: str | int | None = None,
     fit: str = "box",
 ) -> Picture:
-    """Gives a layer the texture of another layer, of another file's layer, or of a picture."""
+    """Gives a layer the texture of another layer, of another file's layer, or of a picture.
+
+    Args:
+        picture: The picture.
+        layer: Name or position of the layer that changes.
+        source: Name of a layer of the picture, or of a `.pxi` file or picture file.
+        from_layer: Name or position of a layer of that `.pxi` file; its front layer by default.
+        fit: ``box`` stretches the texture from box to box; ``shape`` maps outline to outline.
+
+    Raises:
+        UsageError: The source does not exist, or does not fit.
+        InputError: The source cannot be read.
+    """
     target = layer_named(picture, layer)
     networks = list(picture.networks)
     if source in {v.name for v in picture.layers}:
@@ -150,10 +177,16 @@ def texture(
 
 
 def _brought(picture: Picture, home: Picture, origin: Layer, networks: list[Network]) -> Texture:
-    """The texture of layer `origin` of picture `home` as one of `picture`.
+    """Texture of layer `origin` of picture `home`, in a form that `picture` can use.
 
-    Planes come as a whole, with what other layers of their file show of them. A network or planes
-    that the picture has already are taken from there; `networks` may grow.
+    Planes are taken as a whole, including the parts that other layers of their file show. A network
+    or planes that `picture` has already are shared.
+
+    Args:
+        picture: The picture that gets the texture.
+        home: The picture that the texture comes from.
+        origin: The layer of `home` that has the texture.
+        networks: Networks of `picture`; one is appended if the texture needs another.
     """
     texture = origin.texture
     if isinstance(texture, PyramidTexture):
@@ -174,11 +207,15 @@ def _brought(picture: Picture, home: Picture, origin: Layer, networks: list[Netw
 
 
 def _loaded(source: str, name: str | int | None) -> tuple[Picture, Layer]:
-    """A `.pxi` file and a layer of it, or a picture file encoded as one layer.
+    """Reads a `.pxi` file and chooses a layer of it, or encodes a picture file as one layer.
+
+    Returns:
+        The picture and the layer.
 
     Raises:
-        UsageError: There is no such file.
-        InputError: It cannot be read.
+        UsageError: There is no such file, or `name` is given for a file that is not a `.pxi` file.
+        InputError: The file cannot be read.
+        PxiError: The encoder, which a picture file needs, is not installed.
     """
     try:
         with open(source, "rb") as file:
@@ -208,13 +245,19 @@ def _loaded(source: str, name: str | int | None) -> tuple[Picture, Layer]:
 
 
 Shapes = tuple[Layer, tuple[int, int], Layer, tuple[int, int]]
-"""A layer and the size of its canvas, and another one whose shape is mapped to its shape."""
+"""A layer and the size of its canvas; another layer and the size of that one's canvas.
+
+The shape of the first is mapped to the shape of the second.
+"""
 
 
 def _placed(layer: Layer, origin: Layer, matched: Shapes | None) -> Layer:
-    """A meshed layer, whose texture is that of `origin`, with nodes that show what that shows.
+    """Sets `places` of a layer so that its nodes show the texture of `origin` as `origin` does.
 
-    `matched` says whose outlines meet; None stretches box to box.
+    Args:
+        layer: A layer with a mesh and the texture of `origin`.
+        origin: The layer that the texture comes from.
+        matched: Two layers whose outlines are mapped to each other; None stretches box to box.
     """
     assert layer.mesh is not None, "`meshed` gave it one"
     rest = layer.mesh.refined.nodes / (1 << FRACTION_BITS)
@@ -236,10 +279,17 @@ def _placed(layer: Layer, origin: Layer, matched: Shapes | None) -> Layer:
 
 
 def _matched(points: Reals, shapes: Shapes) -> Reals:
-    """Points [N, 2] of a layer in the shape of another, so that outlines meet.
+    """Maps points of a layer to the shape of another layer, outline to outline.
 
-    Polar: a point at direction t from the centre of its shape, at a share r of the way to the
-    outline, becomes the point at direction t and share r in the other shape.
+    The map is polar. A point in direction t from the centre of its shape, at a share r of the
+    distance to the outline, is mapped to direction t and share r in the other shape.
+
+    Args:
+        points: float64 [N, 2] in canvas pixels.
+        shapes: The two layers.
+
+    Returns:
+        float64 [N, 2] in pixels of the other canvas.
     """
     layer, size, origin, origin_size = shapes
     here, there = _Star(layer.boundary, size), _Star(origin.boundary, origin_size)
@@ -250,7 +300,7 @@ def _matched(points: Reals, shapes: Shapes) -> Reals:
 
 
 class _Star:
-    """A shape seen from its centre: how far its outline is in every direction."""
+    """Shape as the distance of its outline from its centre, in every direction."""
 
     DIRECTIONS = 360
 
@@ -276,7 +326,14 @@ class _Star:
         self._far = np.interp(steps, seen, far[seen], period=self.DIRECTIONS)
 
     def reach(self, angle: Reals) -> Reals:
-        """Distance of the outline from the centre in directions [n], at least 1 px."""
+        """Distance of the outline from the centre in pixels, at least 1.
+
+        Args:
+            angle: float64 [N] directions in radians.
+
+        Returns:
+            float64 [N] distances.
+        """
         place = (angle / (2 * math.pi) % 1) * self.DIRECTIONS - 0.5
         steps = np.arange(self.DIRECTIONS)
         found = np.interp(place % self.DIRECTIONS, steps, self._far, period=self.DIRECTIONS)

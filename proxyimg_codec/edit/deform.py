@@ -24,13 +24,26 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Index = NDArray[np.int64]
 
-COTANGENT = (0.05, 10.0)  # clamp of edge weights: obtuse and sliver triangles stay harmless
-STEPS = 150  # of the alternation, at most
-STRIDE, MOMENTUM = 1.5, 0.6  # of one step (heavy ball): about a third of the plain steps
-STILL = 1e-5  # movement in a step at which it has converged, in extents of the mesh
-ROUNDS, ROUND_STEPS = 32, 10  # of stiffening, at most
-OPPOSITE = np.array([[0, 2, 1], [2, 0, 0], [1, 0, 0]])  # corner opposite to the edge of two others
-FOLDING, SQUEEZED = 0.02, 0.25  # signed least stretch that starts stiffening; that is stiffened
+COTANGENT = (0.05, 10.0)
+"""Range that edge weights are clamped to, so that obtuse and sliver triangles do no harm."""
+
+STEPS = 150
+"""Most steps of the alternation."""
+
+STRIDE, MOMENTUM = 1.5, 0.6
+"""Factors of a step (heavy ball method); they save about two thirds of the steps."""
+
+STILL = 1e-5
+"""Movement in a step, in extents of the mesh, below which the alternation has converged."""
+
+ROUNDS, ROUND_STEPS = 32, 10
+"""Most rounds of stiffening, and steps in each."""
+
+OPPOSITE = np.array([[0, 2, 1], [2, 0, 0], [1, 0, 0]])
+"""Corner that lies opposite to the edge between two other corners."""
+
+FOLDING, SQUEEZED = 0.02, 0.25
+"""Least stretch of a mesh below which stiffening starts; that of triangles which are stiffened."""
 
 
 def drag(
@@ -42,29 +55,30 @@ def drag(
 ) -> Real:
     """Moves a mesh so that some of its points arrive at their targets and the rest follows.
 
-    Within a connected component: a single handle translates it; several deform it as little as
-    they allow, and those that do not move are pins. A component without a handle keeps its shape
-    and follows its surroundings: it takes the rigid motion that best fits the moved nodes of the
-    other components, near ones counting most. A point outside the mesh holds the nearest point of
-    it, at an unchanged offset. Contradictory targets are met in the sense of least squares.
+    Each connected component is treated by itself. A single handle translates it. Several handles
+    deform it as little as they allow; handles that do not move are pins. A component without a
+    handle keeps its shape and follows its surroundings: it takes the rigid motion that fits the
+    moved nodes of the other components best, near ones with more weight. A handle outside the mesh
+    holds the nearest point of the mesh at an unchanged offset. Contradictory targets are met in the
+    sense of least squares.
 
-    Triangles that would fold are made stiffer, step by step, until they do not or no way is found.
+    Triangles that would fold are made stiffer in rounds, until none folds or no way is found.
 
     Args:
-        nodes: Present positions in px, float64 [N, 2].
-        triangles: Three node indices each, [T, 3]; any orientation, degenerate ones included.
-        points: Where the handles hold the present mesh, in px, float64 [H, 2].
-        targets: Where the handles shall go, in px, float64 [H, 2].
-        rest: The shape whose local rigidity is kept, in px, float64 [N, 2]; `nodes` by default.
+        nodes: float64 [N, 2] present positions of the nodes in pixels.
+        triangles: int32 [T, 3] nodes of each triangle, in any orientation; they may be degenerate.
+        points: float64 [H, 2] points of the present mesh that the handles hold, in pixels.
+        targets: float64 [H, 2] positions that the handles move to, in pixels.
+        rest: float64 [N, 2] positions in pixels whose local shape is kept; `nodes` by default.
 
     Returns:
-        New positions in px, float64 [N, 2].
+        float64 [N, 2] new positions of the nodes in pixels.
 
     Raises:
-        UsageError: Shapes do not fit, a number is not finite, a triangle names a node that is not
-            there, or there are handles but no triangles to hold.
-        LimitError: More than `WIDEST` nodes are equally far (in edges) from one end of the mesh,
-            as in a fan of that many triangles; an ordinary mesh of N nodes has some sqrt(N).
+        UsageError: Shapes do not fit, a number is not finite, a triangle names a node that does not
+            exist, or there are handles but no triangles to hold.
+        LimitError: More than `WIDEST` nodes are equally far (in edges) from one end of the mesh, as
+            in a fan of that many triangles; in an ordinary mesh of N nodes it is about sqrt(N).
     """
     rest = nodes if rest is None else rest
     mesh = _checked(nodes, triangles, points, targets, rest)
@@ -74,7 +88,7 @@ def drag(
 
 
 def _dragged(mesh: Index, z: Complex, rest: Complex, points: Complex, targets: Complex) -> Complex:
-    """As `drag`, of complex numbers, one component after the other."""
+    """Does the work of `drag` on complex numbers, one component after the other."""
     holders, weights = _attach(z, mesh, points)
     held = (weights * z[mesh[holders]]).sum(1)
     t = targets - (points - held)
@@ -95,7 +109,7 @@ def _dragged(mesh: Index, z: Complex, rest: Complex, points: Complex, targets: C
 
 
 def _body_of(inside: Index, rest: Complex, mesh: Index, holders: Index, weights: Real) -> _Body:
-    """The component of the nodes `inside`, ascending, with the handles that hold it."""
+    """Component of the nodes `inside`, which ascend, and the handles that hold it."""
     which = np.isin(mesh[:, 0], inside)
     local = np.searchsorted(inside, mesh[which])
     return _Body(rest[inside], local, np.cumsum(which)[holders] - 1, weights)
@@ -104,7 +118,11 @@ def _body_of(inside: Index, rest: Complex, mesh: Index, holders: Index, weights:
 def _checked(
     nodes: Real, triangles: NDArray[np.int32], points: Real, targets: Real, rest: Real
 ) -> Index:
-    """The triangles as int64 [T, 3], if everything fits together."""
+    """Checks the arguments of `drag`; returns the triangles as int64 [T, 3].
+
+    Raises:
+        UsageError: See `drag`.
+    """
     arrays = {"nodes": nodes, "points": points, "targets": targets, "rest": rest}
     for name, values in arrays.items():
         if values.ndim != 2 or values.shape[1] != 2:
@@ -125,7 +143,7 @@ def _checked(
 
 
 def _attach(z: Complex, triangles: Index, points: Complex) -> tuple[Index, Real]:
-    """The triangle nearest to each point [H], and its barycentric weights there [H, 3]."""
+    """Triangle nearest to each point, int64 [H], and barycentric weights in it, float64 [H, 3]."""
     corner = z[triangles]
     edge = np.roll(corner, -2, 1) - np.roll(corner, -1, 1)  # opposite to each corner
     double_area = _cross(edge[:, 0], edge[:, 1])
@@ -150,22 +168,22 @@ def _attach(z: Complex, triangles: Index, points: Complex) -> tuple[Index, Real]
 
 
 def _complex(points: Real) -> Complex:
-    """Points [N, 2] as complex numbers x + iy [N]."""
+    """Converts points [N, 2] to complex numbers x + iy [N]."""
     return np.asarray(points @ np.array([1, 1j]))
 
 
 def _columns(z: Complex) -> Real:
-    """Complex numbers x + iy [N] as points [N, 2]."""
+    """Converts complex numbers x + iy [N] to points [N, 2]."""
     return np.stack([z.real, z.imag], 1)
 
 
 def _cross(u: Complex, v: Complex) -> Real:
-    """The z component of the cross product."""
+    """Cross product of two plane vectors, as its z component."""
     return (np.conj(u) * v).imag
 
 
 def _components(count: int, triangles: Index) -> Index:
-    """For each node the lowest node that triangles connect it to, [N]."""
+    """Component of each node, [N], as the lowest node that triangles connect it to."""
     label = np.arange(count)
     while True:
         low = label.copy()
@@ -177,7 +195,7 @@ def _components(count: int, triangles: Index) -> Index:
 
 
 def _rigid(before: Complex, after: Complex, z: Complex, weights: Real | None = None) -> Complex:
-    """`z` under the rigid motion that best maps `before` to `after` (least squares)."""
+    """Applies to `z` the rigid motion that maps `before` to `after` best (least squares)."""
     centre, goal = (np.average(v, weights=weights) for v in (before, after))
     turn = np.average(np.conj(before - centre) * (after - goal), weights=weights)
     size = np.average(np.abs(before - centre) ** 2, weights=weights)
@@ -195,7 +213,7 @@ def _follow(z: Complex, moved: Complex, component: Index, grabbed: Index) -> Non
 
 
 class _Body:
-    """One connected component, its handles, and the linear system of the global step."""
+    """Connected component with its handles and the linear system of the global step."""
 
     def __init__(self, rest: Complex, triangles: Index, holders: Index, weights: Real) -> None:
         self.triangles, self.count = triangles, len(rest)
@@ -215,7 +233,7 @@ class _Body:
         self.stiffen(np.ones(len(triangles)))
 
     def stiffen(self, factor: Real) -> None:
-        """Weighs each triangle's part of the energy by `factor` [T], and factors the system."""
+        """Multiplies the energy of each triangle by `factor` [T], and factors the system."""
         self.weight = w = self.cotangent * factor[:, None]
         laplacian = -w[:, OPPOSITE] * (1 - np.eye(3))
         laplacian -= laplacian.sum(2, keepdims=True) * np.eye(3)
@@ -225,29 +243,35 @@ class _Body:
         self.force = np.linalg.pinv(self.rows @ self.pull, rcond=1e-10, hermitian=True)
 
     def turns(self, z: Complex) -> Complex:
-        """The rotation of each triangle that best maps its rest edges to those of `z`, [T, 1]."""
+        """Rotation of each triangle, [T, 1], that maps its rest edges best to those of `z`."""
         turn = (self.weight * np.conj(self.edge) * (z[self.end] - z[self.start])).sum(1)
         turn[turn == 0] = 1
         return np.asarray((turn / np.abs(turn))[:, None])
 
     def load(self, edges: Complex) -> Real:
-        """What the weighted sum of squares of d' - `edges` [T, 3] asks of each node, [N, 2]."""
+        """Right-hand side, float64 [N, 2], of the linear system of the global step.
+
+        Its solution minimizes the weighted sum of squares of d' - `edges`.
+
+        Args:
+            edges: complex128 [T, 3] wanted edges d' of each triangle.
+        """
         flow = (self.weight * edges).ravel()
         a, b, n = self.start.ravel(), self.end.ravel(), self.count
         sums = [np.bincount(b, f, n) - np.bincount(a, f, n) for f in (flow.real, flow.imag)]
         return np.stack(sums, 1)
 
     def step(self, z: Complex, targets: Complex) -> Complex:
-        """The best rotations for `z`, then the best positions for those, handles exactly met."""
+        """Positions [N] of least energy for the rotations that fit `z` best; handles are met."""
         goal = _columns(targets)
         x = self.matrix.solve(self.load(self.turns(z) * self.edge) + self.rows.T @ goal)
         x += self.pull @ (self.force @ (goal - self.rows @ x))
         return _complex(x)
 
     def least_stretch(self, z: Complex) -> Real:
-        """Smaller singular value of each triangle's map from rest, negative if it is folded [T].
+        """Smaller singular value of each triangle's map from rest, [T]; negative if it is folded.
 
-        With the map d' = a d + b conj(d), it is |a| - |b|. Degenerate triangles count as 1.
+        For the map d' = a d + b conj(d) it is |a| - |b|. Degenerate triangles have 1.
         """
         d0, d1 = self.edge[:, 0], self.edge[:, 1]
         e = z[self.end[:, :2]] - z[self.start[:, :2]]
@@ -258,7 +282,11 @@ class _Body:
 
 
 def _settle(body: _Body, z: Complex, targets: Complex) -> Complex:
-    """Minimizes from `z`; then stiffens what folds, and keeps the state with the fewest folds."""
+    """Minimizes the energy from `z`; then stiffens folded triangles while that unfolds some.
+
+    Returns:
+        The state with the fewest folded triangles.
+    """
     z = best = _alternate(body, z, targets, STEPS)
     squeeze = body.least_stretch(z)
     fewest, factor = np.count_nonzero(squeeze <= 0), np.ones(len(body.triangles))
@@ -276,7 +304,7 @@ def _settle(body: _Body, z: Complex, targets: Complex) -> Complex:
 
 
 def _alternate(body: _Body, z: Complex, targets: Complex, steps: int) -> Complex:
-    """Local and global steps with momentum until nothing moves, the last one plain."""
+    """Alternates local and global steps until nothing moves; all but the last have momentum."""
     before = z = body.step(z, targets)
     for _ in range(steps):
         ahead = z + STRIDE * (body.step(z, targets) - z) + MOMENTUM * (z - before)

@@ -1,4 +1,4 @@
-"""Going back: the states that the history of a picture holds."""
+"""Undo: returns to earlier states, which the history of a picture holds."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from ..model import Picture
 
 
 def undone(picture: Picture, steps: int = 1) -> Picture:
-    """The picture before its last `steps` edits.
+    """Picture before its last `steps` edits.
 
     Raises:
-        UsageError: There are not as many.
-        FormatError, UnsupportedError, LimitError: The history of a file holds a state that is
-            not right.
+        UsageError: The history has fewer edits, or `steps` is less than 1.
+        FormatError, UnsupportedError, LimitError: The state in the history of a file is not valid,
+            needs a newer reader or exceeds the limits.
     """
     history = picture.history
     if not 1 <= steps <= len(history):

@@ -1,4 +1,4 @@
-"""Edits of a layer as methods; each names an operation (`operations`) that is then applied."""
+"""Edits of a layer as methods; each applies an operation of `operations`."""
 
 from __future__ import annotations
 
@@ -10,43 +10,48 @@ Edited = TypeVar("Edited")
 
 
 class Editable(Generic[Edited]):
-    """Methods of a layer that return a new image, in which the layer is changed.
+    """Methods of a layer that return a new image in which the layer is changed.
 
-    Lengths are in canvas pixels, angles in degrees clockwise, pivots canvas points (the centre of
-    the layer by default). All raise `UsageError` for what cannot be done. Layers that have this
-    one as parent follow its geometry.
+    Lengths are in canvas pixels, angles in degrees clockwise. Pivots are canvas points; the default
+    is the centre of the layer. All methods raise `UsageError` if the edit cannot be done. Layers
+    that have this one as parent follow its geometry.
     """
 
     def _edited(self, op: str, **values: Any) -> Edited:
-        """The picture after operation `op` on this layer; values that are None are left out."""
-        raise NotImplementedError  # each kind of handle knows its picture
+        """Image after operation `op` on this layer; values that are None are left out."""
+        raise NotImplementedError  # only subclasses know the picture of the layer
 
     def moved(self, dx: float, dy: float) -> Edited:
-        """Moved by `dx`, `dy`; there and back is exact."""
+        """Moves the layer by `dx`, `dy`; moving there and back is exact."""
         return self._edited("move", by=[dx, dy])
 
     def rotated(self, degrees: float, pivot: Pair | None = None) -> Edited:
-        """Turned clockwise."""
+        """Turns the layer clockwise."""
         return self._edited("rotate", degrees=degrees, pivot=pivot)
 
     def scaled(self, x: float, y: float | None = None, pivot: Pair | None = None) -> Edited:
-        """Enlarged `x` times across and `y` times (as across by default) down."""
+        """Enlarges the layer `x` times across and `y` times down; by default `y` is `x`."""
         return self._edited("scale", by=[x, x if y is None else y], pivot=pivot)
 
     def sheared(self, x: float, y: float = 0, pivot: Pair | None = None) -> Edited:
-        """Slanted: x grows by `x` a pixel of y, y by `y` a pixel of x."""
+        """Slants the layer: x grows by `x` per pixel of y, and y by `y` per pixel of x."""
         return self._edited("shear", by=[x, y], pivot=pivot)
 
     def transformed(self, matrix: Sequence[float], pivot: Pair | None = None) -> Edited:
-        """Mapped by a, b, c, d, e, f: x' = a x + c y + e, y' = b x + d y + f, about the pivot."""
+        """Applies the affine map x' = a x + c y + e, y' = b x + d y + f about the pivot.
+
+        Args:
+            matrix: a, b, c, d, e, f, as in SVG.
+            pivot: Origin of the map.
+        """
         return self._edited("affine", matrix=list(matrix), pivot=pivot)
 
     def flipped(self, axis: str = "horizontal", pivot: Pair | None = None) -> Edited:
-        """Mirrored: ``horizontal`` exchanges left and right, ``vertical`` top and bottom."""
+        """Mirrors the layer: ``horizontal`` swaps left and right, ``vertical`` top and bottom."""
         return self._edited("flip", axis=axis, pivot=pivot)
 
     def dragged(self, handles: Mapping[Pair, Pair]) -> Edited:
-        """Bent so that each point moves by its vector, as rigidly as possible elsewhere.
+        """Bends the layer so that each point moves by its vector, as rigidly as possible elsewhere.
 
         Args:
             handles: Vectors dx, dy by canvas points x, y on the layer; (0, 0) pins a point.
@@ -54,39 +59,50 @@ class Editable(Generic[Edited]):
         return self._edited("drag", handles=[[*p, *v] for p, v in handles.items()])
 
     def with_point(self, path: int, point: int, dx: float, dy: float) -> Edited:
-        """One control point of the boundary moved; texture appears or disappears there."""
+        """Moves one control point of the boundary; texture appears or disappears there.
+
+        Args:
+            path: Number of the path, from 0.
+            point: Number of the control point in the path, from 0.
+            dx: Distance to the right.
+            dy: Distance down.
+        """
         return self._edited("point", path=path, point=point, by=[dx, dy])
 
     def removed(self) -> Edited:
-        """Taken away: what it hid shows."""
+        """Removes the layer, so that what it hid shows."""
         return self._edited("remove")
 
     def duplicated(self, name: str | None = None) -> Edited:
-        """With a copy in front of it, which shares its texture."""
+        """Puts a copy in front of the layer, which shares its texture."""
         return self._edited("duplicate", name=name)
 
     def renamed(self, name: str) -> Edited:
-        """Under another name."""
+        """Gives the layer another name."""
         return self._edited("rename", name=name)
 
     def reordered(self, to: int | str) -> Edited:
-        """At position `to` from the back, or ``front``, ``back``, ``forward``, ``backward``."""
+        """Moves the layer to position `to` from the back.
+
+        Args:
+            to: Position from the back, or ``front``, ``back``, ``forward``, ``backward``.
+        """
         return self._edited("order", to=to)
 
     def hidden(self) -> Edited:
-        """Not drawn."""
+        """Hides the layer, which is then not drawn."""
         return self._edited("hide")
 
     def shown(self) -> Edited:
-        """Drawn again."""
+        """Shows a hidden layer again."""
         return self._edited("show")
 
     def stilled(self) -> Edited:
-        """Without its motion."""
+        """Removes the motion of the layer."""
         return self._edited("still")
 
     def with_opacity(self, value: float) -> Edited:
-        """With opacity `value` in 0..1."""
+        """Sets the opacity of the layer to `value` in 0..1."""
         return self._edited("opacity", value=value)
 
     def recoloured(
@@ -98,28 +114,29 @@ class Editable(Generic[Edited]):
         tint: str | None = None,
         matrix: Sequence[float] | None = None,
     ) -> Edited:
-        """With other colours, on top of earlier changes of colour.
+        """Changes the colours of the layer, on top of earlier changes of colour.
 
         Args:
-            hue: Degrees to turn the hue by.
-            saturation: Factor; 0 is grey.
-            brightness: Factor.
-            tint: ``#rrggbb``; shades of this colour.
-            matrix: Rows of a 3 x 4 matrix applied to red, green, blue and one.
+            hue: Rotation of the hue in degrees.
+            saturation: Factor of the saturation; 0 gives grey.
+            brightness: Factor of red, green and blue.
+            tint: ``#rrggbb``; colours become shades of it.
+            matrix: The 12 entries of a 3 x 4 matrix, row by row, applied to (red, green, blue, 1)
+                in 0..1.
         """
         values = {"hue": hue, "saturation": saturation, "brightness": brightness, "tint": tint}
         return self._edited("recolour", **values, matrix=None if matrix is None else list(matrix))
 
     def textured(self, source: str, layer: str | int | None = None, fit: str = "box") -> Edited:
-        """With the texture of something else; its shape stays.
+        """Gives the layer another texture; its shape stays.
 
         Args:
-            source: A layer of this picture; or a `.pxi` file or a picture file, by its name.
-            layer: A layer of that `.pxi` file, by name or position; its front one by default.
-            fit: ``box`` stretches box to box; ``shape`` maps outline to outline.
+            source: Name of a layer of this picture, or of a `.pxi` file or picture file.
+            layer: Name or position of a layer of that `.pxi` file; its front layer by default.
+            fit: ``box`` stretches the texture from box to box; ``shape`` maps outline to outline.
         """
         return self._edited("texture", source=source, from_layer=layer, fit=fit)
 
     def with_parent(self, name: str | None) -> Edited:
-        """Following a layer or group, or none."""
+        """Lets the layer follow another layer or a group; None for none."""
         return self._edited("parent", to=name or "")

@@ -1,4 +1,4 @@
-"""The registry of edit operations, and what all of them share.
+"""Registry of the edit operations, and functions that all of them share.
 
 An operation is data: a JSON object with the key ``op`` and parameters. Its function takes a picture
 and returns another; the original is never changed.
@@ -25,15 +25,16 @@ from ..texture.network import Network
 NAME_MAX = 200
 
 NUMBER_MAX = 1e12
-"""Largest magnitude of a number: products of a few still have room in double precision."""
+"""Largest magnitude of a number, so that products of a few do not overflow."""
 
 HANDLES_MAX = 500
-"""Most handles of a drag, whose time grows with their cube: some seconds."""
+"""Most handles of a drag; its time grows with their cube, and these take some seconds."""
 
 NUMBER = {"type": "number", "minimum": -NUMBER_MAX, "maximum": NUMBER_MAX}
 
 
 def _numbers(count: int) -> dict[str, Any]:
+    """JSON schema of a list of `count` numbers."""
     return {"type": "array", "items": NUMBER, "minItems": count, "maxItems": count}
 
 
@@ -57,12 +58,18 @@ KINDS: dict[str, dict[str, Any]] = {
     "fit": {"enum": ["box", "shape"]},
     "colour": {"type": "string", "pattern": "^#[0-9a-fA-F]{6}$"},
 }
-"""JSON schema of each kind of parameter."""
+"""JSON schema of each kind of parameter, by the name of the kind."""
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One parameter: its kind, whether it must be given, and a sentence."""
+    """Parameter of an operation.
+
+    Attributes:
+        kind: Key of `KINDS`.
+        needed: Whether it must be given.
+        meaning: Description, a phrase.
+    """
 
     kind: str
     needed: bool
@@ -71,7 +78,13 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Operation:
-    """One operation: its function, parameters and a sentence."""
+    """Edit operation.
+
+    Attributes:
+        apply: Function from a picture and the parameters to the edited picture.
+        parameters: Parameters by name.
+        meaning: Description, a sentence.
+    """
 
     apply: Callable[..., Picture]
     parameters: Mapping[str, Parameter]
@@ -82,9 +95,11 @@ OPERATIONS: dict[str, Operation] = {}
 
 
 def operation(name: str, /, **parameters: str) -> Callable[[Callable[..., Picture]], Any]:
-    """Registers a function as operation `name`.
+    """Registers a function as operation `name`; the first line of its docstring is its meaning.
 
-    Each parameter is described by ``kind: sentence``; a kind that ends in ``?`` may be left out.
+    Args:
+        name: Name of the operation.
+        **parameters: ``kind: meaning`` of each parameter; a kind that ends in ``?`` is optional.
     """
     known = {}
     for key, text in parameters.items():
@@ -99,7 +114,11 @@ def operation(name: str, /, **parameters: str) -> Callable[[Callable[..., Pictur
 
 
 def run(picture: Picture, values: Mapping[str, Any]) -> Picture:
-    """The picture after one operation, which its history then tells.
+    """Applies one operation to a picture, and adds it to the history.
+
+    Args:
+        picture: The picture.
+        values: The operation: its name under ``op``, and its parameters.
 
     Raises:
         UsageError: The operation is unknown, has wrong parameters, or cannot be done.
@@ -122,20 +141,20 @@ def run(picture: Picture, values: Mapping[str, Any]) -> Picture:
             raise UsageError(f"{name}: {key} is missing; it must be {parameter.meaning}")
     result = chosen.apply(picture, **given)
     text = json.dumps({"op": name, **given}, ensure_ascii=False)
-    # Names of files may hold what UTF-8 cannot; written like this it is JSON again.
+    # Names of files may have surrogates, which UTF-8 cannot encode; as escapes they are valid JSON.
     step = Step(text.encode(errors="backslashreplace").decode(), state(picture))
     return replace(result, history=(*picture.history, step))
 
 
 def _plain(value: Any) -> Any:
-    """A value with numbers and arrays of numpy as those of Python."""
+    """Converts numpy numbers and arrays in a value to Python's."""
     if isinstance(value, (list, tuple)):
         return [_plain(v) for v in value]
     return value.tolist() if isinstance(value, (np.generic, np.ndarray)) else value
 
 
 def _fits(value: Any, kind: str) -> bool:
-    """Whether a value is of a kind. Numbers that count are not floating point."""
+    """Whether a value is of a kind; an integer must not be given as floating point, such as 2.0."""
     try:
         json_schema.check(value, KINDS[kind], whole_floats=False)
     except UsageError:
@@ -144,10 +163,10 @@ def _fits(value: Any, kind: str) -> bool:
 
 
 def layer_named(picture: Picture, name: str | int) -> Layer:
-    """The layer with a name or at a position.
+    """Layer with a name or at a position.
 
     Raises:
-        UsageError: There is none, or it is a group.
+        UsageError: There is no such layer, or it is a group.
     """
     if isinstance(name, str) and name in picture.groups:
         raise UsageError(f"{name!r} is a group; this works on single layers")
@@ -155,7 +174,7 @@ def layer_named(picture: Picture, name: str | int) -> Layer:
 
 
 def members(picture: Picture, name: str | int) -> list[Layer]:
-    """The layers of a group, or a layer, and all that follow it, back to front.
+    """Layers of a group, or a layer, and all layers that follow them, back to front.
 
     Raises:
         UsageError: There is no such layer or group, or the group is empty.
@@ -179,18 +198,22 @@ def members(picture: Picture, name: str | int) -> list[Layer]:
 
 
 def shown_together(picture: Picture, name: str | int) -> list[Layer]:
-    """The layers whose look changes together: those of a group, or one layer alone."""
+    """Layers whose appearance changes together: those of a group, or a single layer.
+
+    Raises:
+        UsageError: There is no such layer or group, or the group is empty.
+    """
     group = isinstance(name, str) and name in picture.groups
     return members(picture, name) if group else [layer_named(picture, name)]
 
 
 def parents(picture: Picture) -> dict[str, str | None]:
-    """The parent of every layer and group, by name."""
+    """Parent of every layer and group, by name; None for none."""
     return {**{layer.name: layer.parent for layer in picture.layers}, **picture.groups}
 
 
 def substituted(picture: Picture, layers: Iterable[Layer]) -> Picture:
-    """The picture with some layers replaced by others of the same names."""
+    """Picture in which some layers are replaced by layers of the same names."""
     new = {layer.name: layer for layer in layers}
     return changed(picture, [new.get(layer.name, layer) for layer in picture.layers])
 
@@ -202,7 +225,16 @@ def changed(
     groups: Mapping[str, str | None] | None = None,
     networks: Sequence[Network] | None = None,
 ) -> Picture:
-    """The picture with other layers, groups or networks, and all that follows from them.
+    """Picture with other layers, groups or networks; everything that depends on them is updated.
+
+    Networks at the end that no layer uses any more are dropped. Ancillary chunks that are not safe
+    to copy are dropped, too.
+
+    Args:
+        picture: The picture before.
+        layers: All layers after, back to front.
+        groups: Parents of groups by name; those of `picture` by default.
+        networks: Decoder networks; those of `picture` by default.
 
     Raises:
         UsageError: No layer is left.
@@ -211,7 +243,7 @@ def changed(
         raise UsageError("this would remove the last layer; a picture needs one")
     kept = list(picture.networks if networks is None else networks)
     used = {layer.texture.network for layer in layers}
-    # Networks that no layer needed before either are none of our business.
+    # Networks that no layer used before the edit either are kept: they are not the edit's matter.
     before = {layer.texture.network for layer in picture.layers}
     while (last := len(kept) - 1) not in used and (last in before or last >= len(picture.networks)):
         kept.pop()
@@ -229,7 +261,7 @@ def changed(
 
 
 def _covers(back: Layer, networks: Sequence[Network]) -> bool:
-    """Whether a back layer covers the whole canvas and lets nothing through."""
+    """Whether a back layer covers the whole canvas and is opaque."""
     still = back.boundary is None and not back.pose.affine and back.pose.nodes is None
     still = still and back.track is None
     visible = back.pose.opacity == OPACITY_MAX and not back.pose.hidden
@@ -237,7 +269,7 @@ def _covers(back: Layer, networks: Sequence[Network]) -> bool:
 
 
 def _info(picture: Picture, layers: Sequence[Layer]) -> Mapping[str, Any] | None:
-    """The iNFO with an area for each layer; that of a copy is the original's."""
+    """Values of iNFO with an area for each layer; a copy of a layer has that of the original."""
     if picture.info is None or not picture.info["areas"]:
         return picture.info
     areas = dict(zip((v.texture for v in picture.layers), picture.info["areas"], strict=True))
@@ -249,7 +281,7 @@ def _info(picture: Picture, layers: Sequence[Layer]) -> Mapping[str, Any] | None
 
 
 def free_name(picture: Picture, wanted: str) -> str:
-    """`wanted`, or with a number if a layer or group has that name."""
+    """Returns `wanted`, with a number appended if a layer or group has that name."""
     taken, name, number = parents(picture), wanted, 2
     while name in taken:
         name = f"{wanted} {number}"
@@ -258,10 +290,10 @@ def free_name(picture: Picture, wanted: str) -> str:
 
 
 def checked_name(picture: Picture, name: str) -> str:
-    """A name that is free.
+    """Checks a new name, and returns it.
 
     Raises:
-        UsageError: It is taken, empty, too long, or not printable.
+        UsageError: The name is taken, empty, too long, or not printable.
     """
     if not 1 <= len(name) <= NAME_MAX or not name.isprintable():
         raise UsageError(f"name {name!r} must have 1..{NAME_MAX} printable characters")

@@ -1,4 +1,7 @@
-"""Outlines from SVG onto the layers of a picture: what `export.svg` writes, edited by hand."""
+"""Import of outlines from SVG: takes the boundaries of layers from a file.
+
+The file is one that `export.svg` wrote and that was edited by hand, or one like it.
+"""
 
 from __future__ import annotations
 
@@ -17,37 +20,39 @@ from ..render.neighbours import present_outline
 from .svg_shapes import Points, curves_of, page_of, shapes, tag_of
 
 UNITS = (6, 5, 4)
-"""Units of new boundaries: the finest in which all coordinates are in range."""
+"""Units of new boundaries, the finest first; the first in which all coordinates fit is taken."""
 
 EXACT = 0.02
-"""Control points that are this close to multiples of a layer's own unit are such multiples."""
+"""Distance, in a layer's own unit, at which a coordinate is taken as a multiple of that unit."""
 
 _TOKEN = re.compile(r"[A-DF-Za-df-z]|(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
-"""A command or number of path data: a cubic has seven at most."""
+"""A command or number of path data; a cubic curve has at most seven."""
 
 
 def load(
     image: Pictured, data: bytes, name: str = "the SVG", limits: Limits = DEFAULT_LIMITS
 ) -> dict[str, Boundary]:
-    """The outlines in an SVG file, by the layer that each belongs to.
+    """Reads the outlines in an SVG file, by the name of the layer that each belongs to.
 
     The page is the canvas. A shape belongs to the layer that its Inkscape label, id or title names.
-    Transforms are applied, open paths closed, lines, quadratics and arcs become cubics. Coordinates
-    keep the unit of a layer at rest where they are multiples of it, so that an unchanged file gives
-    identical control points. Passed over are a layer that covers the whole canvas, and an unchanged
-    outline of a layer that is not at rest, whose unit no file can hold.
+    Transforms are applied and open paths are closed; lines, quadratic curves and arcs become cubic
+    curves. Coordinates that are multiples of the unit of a layer at rest keep that unit, so that an
+    unchanged file gives identical control points. Two kinds of shapes are skipped: the rectangle of
+    a layer that covers the whole canvas, and an unchanged outline of a layer that is not at rest,
+    because no file can hold its unit.
 
     Args:
-        image: The picture; where its layers stand at present is the canvas of the file.
-        data: The SVG file.
-        name: What messages call it.
-        limits: Bounds the number of segments.
+        image: The picture.
+        data: The SVG file. Its outlines are in the present places of the layers.
+        name: Name of the file in error messages.
+        limits: Bounds on the number of segments.
 
     Raises:
-        InputError: Not SVG, a shape that belongs to no layer or cannot be a boundary, or nothing
-            that belongs to any.
-        UnsupportedError: The file has clones, nested documents or even-odd filled holes.
-        LimitError: Too large.
+        InputError: The file is not SVG, has no outlines, or has a shape that belongs to no layer or
+            cannot be a boundary.
+        UnsupportedError: The file has clones, nested documents or holes filled by the even-odd
+            rule.
+        LimitError: The file has too many segments.
     """
     picture = image.picture
     root = xml.parse(data, name)
@@ -76,6 +81,7 @@ def load(
 
 
 def _check_fill_rule(element: Element, where: str) -> None:
+    """Refuses a shape of several paths that is filled by the even-odd rule."""
     styled = re.search(r"fill-rule\s*:\s*(\w+)", element.get("style", ""))
     rule = styled[1] if styled else element.get("fill-rule", "nonzero")
     if rule == "evenodd":
@@ -86,7 +92,11 @@ def _check_fill_rule(element: Element, where: str) -> None:
 
 
 def _layer_of(element: Element, picture: Picture, name: str) -> Layer:
-    """The layer that a shape's label, id or title names."""
+    """Layer that the label, id or title of a shape names.
+
+    Raises:
+        InputError: They name no layer.
+    """
     names = [layer.name for layer in picture.layers]
     by_id = dict(zip(identifiers(names), picture.layers, strict=True))
     by_name = {xml.text(layer.name): layer for layer in picture.layers}
@@ -102,7 +112,11 @@ def _layer_of(element: Element, picture: Picture, name: str) -> Layer:
 
 
 def _boundary(curves: list[Points], layer: Layer, picture: Picture, where: str) -> Boundary | None:
-    """Curves on the canvas as a boundary; None for what `load` passes over."""
+    """Converts curves on the canvas to a boundary; None for a shape that `load` skips.
+
+    Raises:
+        InputError: The curves cannot be the boundary of the layer.
+    """
     points = np.concatenate(curves) if curves else np.zeros((0, 2))
     if not np.isfinite(points).all():
         raise InputError(f"{where}: a coordinate is not a finite number")
@@ -131,7 +145,7 @@ def _boundary(curves: list[Points], layer: Layer, picture: Picture, where: str) 
 
 
 def _in_unit(unit: int, curves: list[Points]) -> Boundary:
-    """The boundary of curves [3 m + 1, 2] on the canvas, closed; single points are left out."""
+    """Boundary of curves float64 [3 m + 1, 2] in canvas pixels; single points are left out."""
     paths = []
     for curve in curves:
         path = np.rint(curve * (1 << unit)).astype(np.int64)
@@ -142,7 +156,7 @@ def _in_unit(unit: int, curves: list[Points]) -> Boundary:
 
 
 def same(one: Boundary, other: Boundary) -> bool:
-    """Whether two outlines have the same control points, in whatever units."""
+    """Whether two outlines have the same control points; their units may differ."""
     return one.segments == other.segments and all(
         (p << other.unit == q << one.unit).all()
         for p, q in zip(one.paths, other.paths, strict=True)

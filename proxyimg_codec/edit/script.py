@@ -18,10 +18,16 @@ __all__ = ["OPERATIONS", "appearance", "apply", "parse", "schema", "structure", 
 
 
 def apply(picture: Picture, operations: Iterable[Mapping[str, Any]], first: int = 1) -> Picture:
-    """The picture after all `operations`, in order; errors count them from `first`.
+    """Applies all `operations` to a picture, in order.
+
+    Args:
+        picture: The picture.
+        operations: The operations, as in a script.
+        first: Number of the first operation in error messages.
 
     Raises:
-        UsageError: One of them is unknown or cannot be done; it says which.
+        PxiError: An operation failed; the message begins with its number. It is a `UsageError` if
+            the operation is unknown or cannot be done.
     """
     for number, values in enumerate(operations, first):
         try:
@@ -33,10 +39,14 @@ def apply(picture: Picture, operations: Iterable[Mapping[str, Any]], first: int 
 
 
 def parse(text: str, where: str) -> list[Mapping[str, Any]]:
-    """The operations of a script.
+    """Reads the operations of a script; they are checked when they are applied.
+
+    Args:
+        text: The script, JSON.
+        where: Name of the script in error messages.
 
     Raises:
-        UsageError: It is not JSON, or not a script.
+        UsageError: The text is not JSON, or not a script.
     """
     try:
         script = json.loads(text)
@@ -51,7 +61,7 @@ def parse(text: str, where: str) -> list[Mapping[str, Any]]:
 
 
 def schema() -> dict[str, Any]:
-    """The JSON schema of scripts."""
+    """JSON schema of scripts."""
     variants = []
     for name, operation in OPERATIONS.items():
         properties: dict[str, Any] = {"op": {"const": name}}

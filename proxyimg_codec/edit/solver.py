@@ -1,4 +1,4 @@
-"""A direct solver for the linear systems of triangle meshes, in numpy."""
+"""Direct solver for the linear systems of triangle meshes, in numpy."""
 
 from __future__ import annotations
 
@@ -11,15 +11,23 @@ Real = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 BLOCK, WIDEST = 40, 1000
-"""Nodes in a block of the factorization: aimed at; at most."""
+"""Nodes in a block of the factorization: the number aimed at, and the most that are allowed."""
 
 
 class BlockTridiagonal:
     """Direct solver for the symmetric definite matrix of a mesh, cut into rows of nodes.
 
-    Nodes at equal distance (in edges) from one end of the mesh form a level; a triangle spans at
-    most two adjacent ones, so in that order the matrix is block tridiagonal. Memory and time grow
-    with the square and cube of the levels' widths, some sqrt(N), not of N.
+    Nodes at equal distance (in edges) from one end of the mesh form a level. A triangle spans at
+    most two adjacent levels, so that the matrix is block tridiagonal in that order. Memory grows
+    with the square of the widths of the levels, and time with their cube. A width is about sqrt(N).
+
+    Args:
+        count: Number N of nodes.
+        *elements: int64 [E, 3] nodes of the elements; the first array has the triangles, which
+            connect all nodes.
+
+    Raises:
+        LimitError: A block would have more than `WIDEST` nodes.
     """
 
     def __init__(self, count: int, *elements: Index) -> None:
@@ -50,7 +58,7 @@ class BlockTridiagonal:
         self.below_at = (self.strips[k - 1] + at)[self.below]
 
     def factor(self, elements: Real) -> None:
-        """Factors the sum of 3x3 element matrices [E, 3, 3], in the order of construction."""
+        """Factors the sum of element matrices, float64 [E, 3, 3] in the order of construction."""
         values = elements.ravel()
         square = np.zeros(self.areas[-1])
         strip = np.zeros(self.strips[-1])
@@ -67,7 +75,7 @@ class BlockTridiagonal:
             self.inverse.append(np.asarray(np.linalg.inv(block), np.float64))
 
     def solve(self, right: Real) -> Real:
-        """The solution for each column of `right` [N, K]."""
+        """Solves the system for each column of `right` float64 [N, K]; returns [N, K]."""
         ordered = right[self.order]
         parts = [ordered[a:b] for a, b in zip(self.ends[:-1], self.ends[1:], strict=True)]
         for k, carry in enumerate(self.carry):
@@ -81,7 +89,7 @@ class BlockTridiagonal:
 
 
 def _levels(count: int, triangles: Index, start: int) -> Index:
-    """Distance in edges of every node of a connected mesh from one of them, [N]."""
+    """Distance in edges of every node of a connected mesh from the node `start`, int64 [N]."""
     level, k = np.full(count, -1), 0
     level[start] = 0
     while True:

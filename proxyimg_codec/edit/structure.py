@@ -1,4 +1,4 @@
-"""Operations on which layers there are, in which order, and what belongs together."""
+"""Operations on the stack of layers: removal, copies, names, order, groups and parents."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def remove(picture: Picture, layer: str | int) -> Picture:
 
 
 def _without(picture: Picture, layers: Sequence[Layer], gone: set[str]) -> Picture:
-    """The picture without some layers and groups; what was below them moves up."""
+    """Picture without some layers and groups; what followed them follows their parents."""
     above = parents(picture)
 
     def parent(name: str) -> str | None:
@@ -47,6 +47,7 @@ def _without(picture: Picture, layers: Sequence[Layer], gone: set[str]) -> Pictu
 
 
 def _within(picture: Picture, name: str, group: str) -> bool:
+    """Whether the group or layer `name` is `group` or lies in it, at any depth."""
     above = parents(picture)
     node: str | None = name
     while node is not None and node != group:
@@ -67,6 +68,7 @@ def duplicate(picture: Picture, layer: str | int, name: str | None = None) -> Pi
 
 
 def _position(picture: Picture, layer: Layer) -> int:
+    """Position of a layer from the back."""
     return next(i for i, v in enumerate(picture.layers) if v is layer)
 
 
@@ -149,6 +151,11 @@ def parent(picture: Picture, layer: str | int, to: str) -> Picture:
 
 
 def _check_acyclic(picture: Picture, what: str) -> None:
+    """Refuses a tree in which a group or layer is part of itself.
+
+    Raises:
+        UsageError: There is such a group or layer.
+    """
     above = parents(picture)
     for name in above:
         seen, node = set(), above[name]

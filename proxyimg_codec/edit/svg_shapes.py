@@ -1,6 +1,6 @@
 """Shapes of an SVG file as cubic curves on the canvas of a picture.
 
-The page (viewBox, otherwise width and height) is the canvas, whatever its unit.
+The page of the file (its viewBox, otherwise width and height) is the canvas, in whatever unit.
 """
 
 from __future__ import annotations
@@ -32,20 +32,32 @@ GROUPS = ("g", "a", "switch")
 GEOMETRY = ("x", "y", "width", "height", "rx", "ry", "cx", "cy", "r", "points")
 
 ASPECT = 0.005
-"""How much the page's aspect may differ from the canvas's."""
+"""Largest relative difference between the aspect ratios of page and canvas."""
 
 _MALFORMED = (ValueError, AttributeError, TypeError, IndexError, KeyError, ArithmeticError)
-"""What svgelements raises on data that it cannot make sense of."""
+"""Exceptions that svgelements raises on malformed data."""
 
 
 def tag_of(element: Element) -> str:
-    """The local name of an SVG element, or an empty one."""
+    """Local name of an SVG element; empty for elements of other namespaces."""
     namespace, _, local = element.tag.rpartition("}")
     return local if namespace in ("", "{" + NAMESPACE) else ""
 
 
 def page_of(root: Element, picture: Picture, name: str) -> tuple[Points, tuple[float, float]]:
-    """The transform [3, 3] from user units to canvas pixels, and the page in user units."""
+    """Transform from user units to canvas pixels, and the size of the page.
+
+    Args:
+        root: Root element of the file.
+        picture: The picture whose canvas the page is.
+        name: Name of the file in error messages.
+
+    Returns:
+        float64 [3, 3] transform; width and height of the page in user units.
+
+    Raises:
+        InputError: The file has no valid page, or one of another aspect ratio than the canvas.
+    """
     try:
         if "viewBox" in root.attrib:
             x, y, width, height = map(float, re.split(r"[\s,]+", root.attrib["viewBox"].strip()))
@@ -72,14 +84,27 @@ def page_of(root: Element, picture: Picture, name: str) -> tuple[Points, tuple[f
 
 
 def _pixels(length: str, whole: int) -> float:
-    """A length in pixels at 96 to the inch; percentages are of the `whole`."""
+    """Length in pixels at 96 pixels per inch; percentages are of `whole`."""
     if length.strip().endswith("%"):
         return float(length.strip()[:-1]) / 100 * whole
     return float(svgelements.Length(length).value(ppi=96))
 
 
 def shapes(parent: Element, matrix: Points, name: str) -> Iterator[tuple[Element, Points]]:
-    """All shapes that are drawn, and their transforms [3, 3] to the canvas."""
+    """Finds all shapes that are drawn, and their transforms to the canvas.
+
+    Args:
+        parent: The element whose descendants are searched.
+        matrix: float64 [3, 3] transform of `parent` to canvas pixels.
+        name: Name of the file in error messages.
+
+    Yields:
+        Each shape and its transform, float64 [3, 3].
+
+    Raises:
+        UnsupportedError: The file has clones or nested documents.
+        InputError: A transform is malformed.
+    """
     for element in parent:
         tag = tag_of(element)
         if tag in ("use", "svg"):
@@ -106,7 +131,20 @@ def shapes(parent: Element, matrix: Points, name: str) -> Iterator[tuple[Element
 
 
 def curves_of(element: Element, size: tuple[float, float], where: str) -> list[Points]:
-    """The cubic curves [3 m + 1, 2] of each part of a shape, in user units, not yet closed."""
+    """Cubic curves of a shape, one for each subpath, in user units; not yet closed.
+
+    Args:
+        element: The shape.
+        size: Width and height of the page in user units, which percentages refer to.
+        where: Name of the file and layer in error messages.
+
+    Returns:
+        float64 [3 m + 1, 2] for each subpath of m segments: its first point, then three control
+        points for each segment.
+
+    Raises:
+        InputError: The shape is malformed.
+    """
     try:
         path = _path(element, size)
         curves: list[list[Any]] = []
@@ -129,7 +167,7 @@ def curves_of(element: Element, size: tuple[float, float], where: str) -> list[P
 
 
 def _path(element: Element, size: tuple[float, float]) -> Any:
-    """A shape as a path of svgelements, in user units."""
+    """Converts a shape to a path of svgelements, in user units."""
     tag = tag_of(element)
     if tag == "path":
         return svgelements.Path(element.get("d", ""))
@@ -140,7 +178,10 @@ def _path(element: Element, size: tuple[float, float]) -> Any:
 
 
 def _cubics(segment: Any) -> list[Any]:
-    """The control points of a segment as cubics, without its start; those of lines are its ends."""
+    """Control points of a segment as cubic curves, without its start.
+
+    The control points of a straight line are its ends.
+    """
     a, b = segment.start, segment.end
     if isinstance(segment, svgelements.CubicBezier):
         return [segment.control1, segment.control2, b]

@@ -1,4 +1,4 @@
-"""Operations on where layers are and how they are bent (ProxyImg, equation 4)."""
+"""Operations on the geometry of layers: place, shape and boundary (ProxyImg, equation 4)."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from . import deform
 from .operations import layer_named, members, operation, substituted
 
 REST_UNIT = 6
-"""Unit of boundaries that are brought back to rest from where a layer is now."""
+"""Unit of boundaries that are mapped from the present place of a layer back to rest."""
 
 Pair = Sequence[float]
 _SCALE = 1 << FRACTION_BITS
@@ -31,16 +31,16 @@ PIVOT = "pair?: a canvas point x, y; by default the centre of the layer or group
 
 
 def centre(picture: Picture, layers: Sequence[Layer]) -> tuple[float, float]:
-    """The middle of what bounds layers, in canvas pixels; a multiple of 1/2048.
+    """Centre of the bounding box of layers, in canvas pixels; a multiple of 1/2048.
 
-    Sums of such bounds are exact, so that mirroring twice about the centre is too.
+    Sums of such coordinates are exact, so that mirroring twice about the centre is exact, too.
     """
     x0, y0, x1, y1 = bounds(picture, layers)
     return round((x0 + x1) * _SCALE) / (2 * _SCALE), round((y0 + y1) * _SCALE) / (2 * _SCALE)
 
 
 def bounds(picture: Picture, layers: Sequence[Layer]) -> tuple[float, float, float, float]:
-    """x0, y0, x1, y1 of the rectangle round the present outlines of layers, in canvas pixels."""
+    """Bounding box x0, y0, x1, y1 of points along the present outlines, in canvas pixels."""
     points = []
     for layer in layers:
         shape = present_outline(picture, layer)
@@ -54,7 +54,7 @@ def bounds(picture: Picture, layers: Sequence[Layer]) -> tuple[float, float, flo
 
 
 def sampled(boundary: Boundary) -> NDArray[np.float64]:
-    """Points [n, 2] along a boundary in canvas pixels: 16 a segment, exact."""
+    """Points along a boundary, 16 per segment, float64 [16 S, 2] in canvas pixels; exact."""
     t = np.arange(16) / 16
     weights = np.stack([(1 - t) ** 3, 3 * (1 - t) ** 2 * t, 3 * (1 - t) * t**2, t**3])
     parts = []
@@ -67,14 +67,22 @@ def sampled(boundary: Boundary) -> NDArray[np.float64]:
 def mapped(
     picture: Picture, target: str | int, matrix: Matrix, pivot: Pair | None, what: str
 ) -> Picture:
-    """The layers of a target under an affine map about a pivot.
+    """Applies an affine map about a pivot to a layer and its followers, or to a group.
+
+    Args:
+        picture: The picture.
+        target: Name or position of a layer, or name of a group.
+        matrix: a, b, c, d, e, f of the map, in canvas pixels.
+        pivot: Canvas point that is the origin of the map; by default the centre of the layer or
+            group.
+        what: Name of the operation in error messages.
 
     Raises:
-        UsageError: The result is singular, or too large or too far away.
+        UsageError: A layer would become singular, too large, or too far away.
     """
     layers = members(picture, target)
     if pivot is None:
-        # Of a layer that others follow the centre is its own.
+        # If other layers follow a layer, the pivot is the centre of that layer alone.
         single = not (isinstance(target, str) and target in picture.groups)
         pivot = centre(picture, [layer_named(picture, target)] if single else layers)
     x, y = pivot
@@ -149,7 +157,7 @@ def flip(
 
 
 def meshed(picture: Picture, layer: Layer) -> Layer:
-    """The layer with a mesh: its own, or one derived from its shape."""
+    """Returns a layer with a mesh: its own, or one that is derived from its shape."""
     if layer.mesh is not None:
         return layer
     return replace(layer, mesh=mesher.derived(layer.boundary, picture.size))
@@ -173,7 +181,11 @@ def drag(picture: Picture, layer: str | int, handles: Sequence[Sequence[float]])
 
 
 def _bent(layer: Layer, present: NDArray[np.float64]) -> Pose:
-    """The pose that brings the nodes of a layer to present positions [N, 2] in pixels."""
+    """Pose that brings the nodes of a layer to present positions float64 [N, 2] in pixels.
+
+    Raises:
+        UsageError: A displacement would be out of range.
+    """
     assert layer.mesh is not None, "what bends has a mesh"
     pose = layer.pose
     a, b, c, d, e, f = inverse(pose.floats)
@@ -225,7 +237,7 @@ def outlines(picture: Picture, source: str) -> Picture:
 
 
 def _at_rest(layer: Layer, shape: Boundary) -> Boundary:
-    """The boundary whose outline, in the pose of a layer, is `shape`.
+    """Boundary whose outline, in the pose of a layer, is `shape`.
 
     Raises:
         UsageError: The layer is bent, or the boundary leaves the range of coordinates.

@@ -1,8 +1,8 @@
 """Interleaved rANS (asymmetric numeral systems) with 32-bit states and 16-bit words.
 
-Sources: Duda 2013, "Asymmetric numeral systems"; Giesen 2014, "Interleaved entropy coders".
-Symbols come in *groups* of at most `lanes`; symbol j of a group uses state j, so that a group is a
-few array operations. The encoder runs backwards, hence it records everything first.
+Sources: Duda 2013, "Asymmetric numeral systems"; Giesen 2014, "Interleaved entropy coders". Symbols
+are coded in *groups*: symbol j of a group uses state j modulo the number of lanes, so that a group
+takes a few array operations. The encoder runs backwards, therefore it records all symbols first.
 """
 
 from __future__ import annotations
@@ -22,15 +22,18 @@ SCALE_BITS = 14
 """Frequencies of a distribution sum to `1 << SCALE_BITS`."""
 
 LOW = 1 << 16
-"""States stay in LOW .. 2**32 - 1; encoding starts, and decoding ends, with every state at LOW."""
+"""Lower bound of a state; the upper one is 2**32 - 1.
+
+Encoding starts, and decoding ends, with every state at LOW.
+"""
 
 MAX_LANES_LOG2 = 10
 
 LANE_BITS = 1 << 14
-"""Bits that are worth another lane, which costs some 24 bits."""
+"""Bits of a stream for each lane, by default; a lane costs about 24 bits."""
 
 FEW = 16
-"""With fewer lanes, or symbols, numpy takes longer than one symbol after the other."""
+"""Lanes or symbols below which a loop over single symbols is faster than numpy."""
 
 TOO_SHORT = "entropy-coded stream ends too early"
 
@@ -40,14 +43,21 @@ _SCALE_SHIFT, _WORD_SHIFT, _LOW = np.uint64(SCALE_BITS), np.uint64(16), np.uint6
 
 @functools.lru_cache(maxsize=64)
 def _row_starts(count: int, width: int) -> NDArray[np.int64]:
+    """Offsets of `count` rows of `width` values in a flat array, int64 [count]."""
     return np.arange(count) * width
 
 
 class Encoder:
-    """Collects (start, frequency) pairs in decoding order; `finish` returns the stream."""
+    """Records the start and frequency of symbols in decoding order; `finish` returns the stream."""
 
     def __init__(self, lanes_log2: int | None = None, lane_bits: int = LANE_BITS) -> None:
-        """A stream with 2**lanes_log2 states; None = at most one for every `lane_bits` bits."""
+        """Creates an empty stream.
+
+        Args:
+            lanes_log2: Binary logarithm of the number of lanes. None for a lane for each
+                `lane_bits` bits, rounded down to a power of two.
+            lane_bits: Bits of the stream for each lane.
+        """
         self._lanes_log2, self._lane_bits = lanes_log2, lane_bits
         self._starts: list[NDArray[np.uint16]] = []
         self._freqs: list[NDArray[np.uint16]] = []
@@ -55,7 +65,12 @@ class Encoder:
         self._count = 0
 
     def put(self, start: NDArray[np.integer], freq: NDArray[np.integer]) -> None:
-        """Adds symbols with cumulative frequency `start` [N] and frequency `freq` [N] >= 1."""
+        """Adds one group of symbols.
+
+        Args:
+            start: int [N] cumulative frequencies of the symbols, 0..2**SCALE_BITS - 1.
+            freq: int [N] frequencies of the symbols, at least 1.
+        """
         self.put_groups(
             start.astype(np.uint16), freq.astype(np.uint16), np.array([len(start)], np.int64)
         )
@@ -63,19 +78,30 @@ class Encoder:
     def put_groups(
         self, start: NDArray[np.uint16], freq: NDArray[np.uint16], ends: NDArray[np.int64]
     ) -> None:
-        """Adds groups of symbols; `ends` has the number of symbols up to the end of each."""
+        """Adds several groups of symbols.
+
+        Args:
+            start: uint16 [N] cumulative frequencies of the symbols.
+            freq: uint16 [N] frequencies of the symbols, at least 1.
+            ends: int64 [G] number of symbols up to the end of each group.
+        """
         self._starts.append(start)
         self._freqs.append(freq)
         self._ends.append(ends + self._count)
         self._count += len(start)
 
     def bits(self) -> float:
-        """Information in what was put so far."""
+        """Information content of the symbols so far, in bits."""
         freq = np.concatenate([np.ones(0, np.uint16), *self._freqs])
         return SCALE_BITS * len(freq) - float(np.log2(freq, dtype=np.float64).sum())
 
     def finish(self) -> bytes:
-        """The stream: u8 lanes_log2, u32 states, u32 number of words, u16 words."""
+        """Encodes the symbols.
+
+        Returns:
+            The stream: u8 binary logarithm of the number of lanes, u32 states, u32 number of words,
+            u16 words; little-endian.
+        """
         lanes_log2 = self._lanes_log2
         if lanes_log2 is None:
             worth = int(self.bits()) // self._lane_bits
@@ -102,7 +128,7 @@ def _encoded(
     start: NDArray[np.uint16], freq: NDArray[np.uint16], ends: NDArray[np.int64],
     states: NDArray[np.uint32],
 ) -> NDArray[np.uint16]:  # fmt: skip
-    """Words of the stream; `states` move on."""
+    """Words of the stream, uint16; `states` are replaced by their final values."""
     lanes, state = len(states), states.astype(np.uint64)
     words = [np.zeros(0, np.uint16)]
     for first, end in reversed(list(pairwise([0, *ends.tolist()]))):
@@ -119,13 +145,13 @@ def _encoded(
 
 
 class Decoder:
-    """Reads a stream made by `Encoder` from the front of `data`.
+    """Reads a stream of `Encoder` from the front of `data`.
 
     Attributes:
         lanes: Number of states.
-        states: uint64 [lanes].
-        words: uint64 [words].
-        used: Words read so far.
+        states: uint64 [lanes] states.
+        words: uint64 [words] words of the stream.
+        used: Number of words read so far.
         end: Offset in `data` of the first byte after the stream.
 
     Raises:
@@ -150,10 +176,15 @@ class Decoder:
         self.end = head + 2 * count
 
     def check_capacity(self, symbols: int, alphabet: int) -> None:
-        """Refuses at once what cannot hold `symbols`: a small file cannot ask for a huge array.
+        """Refuses a stream that is too short for its symbols, before memory is allocated for them.
 
-        The most probable symbol has a frequency of at most T - A + 1, with T = 2**SCALE_BITS, so
-        each takes at least (A - 1) / T bits; words and states hold 16 bits each above `LOW`.
+        The most probable of A symbols has a frequency of at most T - A + 1, with T = 2**SCALE_BITS.
+        So each symbol takes at least (A - 1) / T bits. Words and states hold 16 bits each above
+        `LOW`.
+
+        Args:
+            symbols: Number of symbols to decode.
+            alphabet: Number A of different symbols.
 
         Raises:
             FormatError: There are too few words.
@@ -162,7 +193,13 @@ class Decoder:
             raise FormatError("entropy-coded stream is too short for its array", rule="ENT-6")
 
     def symbols(self, cdf: NDArray[np.int64]) -> NDArray[np.int64]:
-        """The next N symbols, whose cumulative frequencies are the rows of `cdf` [N, A + 1].
+        """Decodes a group of N symbols, each with a distribution of its own.
+
+        Args:
+            cdf: int64 [N, A + 1] cumulative frequencies of each distribution, 0..2**SCALE_BITS.
+
+        Returns:
+            int64 [N] symbols, 0..A - 1.
 
         Raises:
             FormatError: The stream ends too early.
@@ -186,7 +223,14 @@ class Decoder:
         return out
 
     def lookup(self, table: NDArray[np.uint16], rows: NDArray[np.int64]) -> NDArray[np.int64]:
-        """The next N symbols, each by a row of `table` [rows, A + 1] of cumulative frequencies.
+        """Decodes a group of N symbols, each with a distribution from a table.
+
+        Args:
+            table: uint16 [R, A + 1] cumulative frequencies of R distributions.
+            rows: int64 [N] row of the table for each symbol.
+
+        Returns:
+            int64 [N] symbols, 0..A - 1.
 
         Raises:
             FormatError: The stream ends too early.
@@ -211,7 +255,13 @@ class Decoder:
         return out
 
     def raw(self, widths: NDArray[np.int64]) -> NDArray[np.int64]:
-        """The next N numbers, of so many bits each, at most `SCALE_BITS`.
+        """Decodes a group of N equally distributed numbers.
+
+        Args:
+            widths: int64 [N] bits of each number, 0..SCALE_BITS.
+
+        Returns:
+            int64 [N] numbers, 0..2**width - 1.
 
         Raises:
             FormatError: The stream ends too early.
@@ -230,7 +280,15 @@ class Decoder:
         return out
 
     def _one_by_one(self, table: NDArray[Any], starts: NDArray[np.int64]) -> NDArray[np.int64]:
-        """The next N symbols, each by the row of `table` [rows, A + 1] that starts at `starts`."""
+        """Decodes a group of symbols in a loop.
+
+        Args:
+            table: [R, A + 1] cumulative frequencies of R distributions.
+            starts: int64 [N] offset of the row of each symbol in the flat table.
+
+        Returns:
+            int64 [N] symbols.
+        """
         ends, last = table.ravel().data, table.shape[1] - 1
         lanes = min(len(starts), self.lanes)
         states = self.states[:lanes].tolist()
@@ -247,7 +305,7 @@ class Decoder:
         return out
 
     def _raw_one_by_one(self, widths: NDArray[np.int64]) -> NDArray[np.int64]:
-        """As `raw`."""
+        """Decodes a group of numbers, as `raw`, in a loop."""
         lanes = min(len(widths), self.lanes)
         states = self.states[:lanes].tolist()
         out = np.empty(len(widths), np.int64)
@@ -261,10 +319,15 @@ class Decoder:
         return out
 
     def by_counts(self, rows: list[list[int]]) -> list[int]:
-        """The next group of symbols, as `symbols` of the distributions that counts stand for.
+        """Decodes a group of symbols whose distributions are given by counts.
+
+        Each symbol has a frequency of 1, and a share of the rest that is proportional to its count.
 
         Args:
-            rows: Counts of each symbol: its share of what is left when each has a frequency of 1.
+            rows: For each symbol to decode, the counts of all symbols; their sum is at least 1.
+
+        Returns:
+            The symbols.
 
         Raises:
             FormatError: The stream ends too early.
@@ -287,7 +350,11 @@ class Decoder:
         return out
 
     def _refilled(self, state: int) -> int:
-        """A new state, with another word if it ran low."""
+        """Shifts another word into a state that is below `LOW`.
+
+        Raises:
+            FormatError: No word is left.
+        """
         if state >= LOW:
             return state
         if self.used == len(self.words):
@@ -296,7 +363,11 @@ class Decoder:
         return state << 16 | int(self.words[self.used - 1])
 
     def _advance(self, count: int, state: NDArray[np.uint64]) -> None:
-        """Puts new values into the first `count` states, and refills those that ran low."""
+        """Stores new values of the first `count` states, and refills those below `LOW`.
+
+        Raises:
+            FormatError: Too few words are left.
+        """
         low = (state < _LOW).nonzero()[0]
         stop = self.used + len(low)
         if stop > len(self.words):
@@ -306,10 +377,10 @@ class Decoder:
         self.states[:count] = state
 
     def finish(self) -> None:
-        """Checks that the stream was used up exactly.
+        """Checks that the stream is used up exactly.
 
         Raises:
-            FormatError: Words are left over or a state is not back at `LOW`.
+            FormatError: Words are left over, or a state is not back at `LOW`.
         """
         if self.used != len(self.words) or (self.states != LOW).any():
             raise FormatError(

@@ -1,1 +1,1 @@
-"""Exporters to other runtimes."""
+"""Export to other file types: clips, OpenRaster, SVG, ONNX."""

@@ -1,8 +1,8 @@
-"""A clip: frames written as a video, an animated picture, numbered PNG files or a sprite sheet.
+"""Writing of clips: a video, an animated picture, numbered PNG files or a sprite sheet.
 
-`clip_target` lists them. Video needs even sides: a last column or row is repeated where one is odd.
-GIF counts time in 1/100 s and WebP in 1/1000 s; there each frame begins at the nearest tick, so
-that errors do not add up.
+`clip_target` lists the kinds. Video needs even sides: a last column or row is repeated where one is
+odd. GIF counts time in 1/100 s and WebP in 1/1000 s; there each frame begins at the nearest tick,
+so that errors do not add up.
 """
 
 from __future__ import annotations
@@ -46,32 +46,35 @@ def write_clip(
     quality: int | None = None,
     background: tuple[int, int, int] = (255, 255, 255),
 ) -> int:
-    """Writes a clip; all of it or nothing, whatever happens on the way.
+    """Writes a clip; either all of it or nothing is written, whatever fails.
 
-    The target is checked before the first frame is asked for. One frame is held at a time, but
-    that all of a sprite sheet is in memory, and GIF keeps the frames in a temporary file. Equal
-    frames give equal bytes. A sequence of files replaces an older one as a whole: of that, the
-    numbers that follow on the new last one are removed.
+    The target is checked before the first frame is asked for. Frames are held one at a time, but a
+    sprite sheet is held in memory as a whole, and GIF keeps its frames in a temporary file. Equal
+    frames give equal bytes. A sequence of files replaces an older one as a whole: files of the
+    older one with higher numbers are removed.
 
     Args:
-        path: See `target_of`; an old file is replaced.
-        frames: uint8 [H, W, 3] or [H, W, 4] with straight alpha, sRGB.
-        fps: Frames a second, 0.01 to 1000; GIF has at most 50, WebP and APNG 90.
-        size: Width and height of the frames in pixels.
-        alpha: The clip is transparent; if not, or if the target is not, frames with alpha are
-            composited over `background`.
-        loop: Repeat for ever, where the file can say so (WebP, GIF, APNG, sprite sheet).
-        sheet: A ``.png`` is a sprite sheet.
+        path: Name of the target, see `target_of`; an old file is replaced.
+        frames: Frames uint8 [H, W, 3], or [H, W, 4] with straight alpha, in sRGB.
+        fps: Frames a second, 0.01 to 1000; at most 50 for GIF, and 90 for WebP and APNG.
+        size: Width W and height H of the frames in pixels.
+        alpha: Whether the clip is transparent. If it is not, or if the target cannot be, frames
+            with alpha are composited over `background`.
+        loop: Whether the clip repeats for ever, where the file can say so (WebP, GIF, APNG, sprite
+            sheet).
+        sheet: Whether a ``.png`` is a sprite sheet.
         quality: 0 to 100 for MP4, WebM and WebP, where 100 is lossless WebP; by default 90.
         background: sRGB colour, 0 to 255.
 
     Returns:
-        Bytes written.
+        Number of bytes written.
 
     Raises:
-        UsageError: The name, rate, size or quality does not suit, or there are no frames.
+        UsageError: The name, rate, size or quality does not suit the target, or there are no
+            frames.
         InputError: The target cannot be written.
-        UnsupportedError: PyAV is not installed.
+        UnsupportedError: PyAV is not installed, which all but PNG files need.
+        ValueError: A frame is not of the given size, or not uint8.
     """
     target = target_of(path, sheet)
     rate = _rate_of(fps, target)
@@ -89,7 +92,7 @@ def write_clip(
 
 
 def _code(frames: Iterator[Frame], coder_of: Callable[[Frame], _Coder], path: str) -> None:
-    """Writes frames with a coder that is made for the first of them."""
+    """Writes frames with the coder that `coder_of` makes for the first of them."""
     first = next(frames, None)
     if first is None:
         raise UsageError(f"{path}: there are no frames to write")
@@ -104,21 +107,22 @@ def _code(frames: Iterator[Frame], coder_of: Callable[[Frame], _Coder], path: st
 
 
 class _Coder(Protocol):
-    """Writes frames into files."""
+    """Interface of objects that write frames into files."""
 
     def add(self, frame: Frame) -> None:
-        """Takes the next frame, uint8 [H, W, 3 or 4], all of one shape."""
+        """Takes the next frame, uint8 [H, W, 3 or 4]; all frames have one shape."""
 
     def finish(self) -> None:
-        """Completes the files; there are no more frames."""
+        """Completes the files after the last frame."""
 
     def close(self) -> None:
-        """Lets go of the files; called after success and after failure."""
+        """Closes the files; called after success and after failure."""
 
 
 def _coder_of(
     target: Target, stage: Path, first: Frame, rate: Fraction, loop: bool, quality: int
 ) -> _Coder:
+    """Coder for a kind of target, which writes into the folder `stage`."""
     if target.kind == "frames":
         return Numbered(target, stage)
     if target.kind == "sheet":
@@ -127,7 +131,11 @@ def _coder_of(
 
 
 def _rate_of(fps: float, target: Target) -> Fraction:
-    """The fraction meant by a number such as 29.97 or 30000 / 1001."""
+    """Frame rate as the fraction that a number such as 29.97 or 30000 / 1001 stands for.
+
+    Raises:
+        UsageError: The target cannot have that rate.
+    """
     fastest = KINDS[target.kind].fastest
     if not (math.isfinite(fps) and SLOWEST <= fps <= fastest):
         raise UsageError(
@@ -139,7 +147,7 @@ def _rate_of(fps: float, target: Target) -> Fraction:
 def _ready(
     frames: Iterable[Frame], size: tuple[int, int], alpha: bool, background: tuple[int, int, int]
 ) -> Iterator[Frame]:
-    """Frames with four channels if `alpha`, else three."""
+    """Converts frames to four channels if `alpha`, otherwise to three."""
     for frame in frames:
         if frame.dtype != np.uint8 or frame.shape not in ((*size[::-1], 3), (*size[::-1], 4)):
             raise ValueError(f"a frame is {frame.dtype} {frame.shape}, not of size {size}")
@@ -155,7 +163,7 @@ def _ready(
 
 @contextlib.contextmanager
 def _explained(path: str) -> Iterator[None]:
-    """Failures of the system and of FFmpeg name the target."""
+    """Turns failures of the system and of FFmpeg into an `InputError` that names the target."""
     try:
         yield
     except write_errors() as error:
@@ -165,11 +173,11 @@ def _explained(path: str) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _staged(target: Target, path: str) -> Iterator[Path]:
-    """A folder whose files take their places if all goes well, and vanish if not."""
+    """Temporary folder whose files replace the target on success, and are deleted on failure."""
     for file in [target.first] + [target.sidecar] * (target.kind == "sheet"):
         if file.exists() and not file.is_file():
             raise InputError(f"{file}: exists and is not a file")
-    # A link stays a link: what it points to is replaced.
+    # A symbolic link is kept: the file that it points to is replaced.
     folder = Path(os.path.realpath(target.path)).parent
     made = target.kind == "frames" and not folder.exists()
     with _explained(path):
@@ -183,13 +191,13 @@ def _staged(target: Target, path: str) -> Iterator[Path]:
     finally:
         shutil.rmtree(stage, ignore_errors=True)
         if made:
-            # Only an empty folder goes.
+            # On failure the folder is empty, and is removed; otherwise it is kept.
             with contextlib.suppress(OSError):
                 folder.rmdir()
 
 
 def _settle(stage: Path, target: Target) -> None:
-    """Moves files from the stage to their places."""
+    """Moves the files from the stage to their places."""
     made = sorted(stage.iterdir())
     for file in made:
         with open(file, "rb") as stream:

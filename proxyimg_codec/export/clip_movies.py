@@ -1,4 +1,4 @@
-"""A clip as a video or an animated picture, written by FFmpeg through PyAV. See `clip`."""
+"""Clips as a video or an animated picture, written by FFmpeg through PyAV; see `clip`."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ if TYPE_CHECKING:
     from av.filter import Graph
 
 MOVIES = ("mp4", "webm", "webp", "gif", "apng")
-"""Kinds of target that need PyAV."""
+"""Kinds of targets that need PyAV."""
 
 
 def movie_of(
     kind: str, file: Path, first: Frame, rate: Fraction, loop: bool, quality: int
 ) -> _Movie | _Gif:
-    """The coder of a file that FFmpeg writes.
+    """Creates the coder of a file that FFmpeg writes.
 
     Args:
         kind: One of `MOVIES`.
-        file: What to write; a folder for temporary files besides.
-        first: The first frame; tells size and alpha, and is not written.
+        file: File to write; its folder also gets temporary files.
+        first: The first frame, uint8 [H, W, 3 or 4]; only its size and content are examined.
         rate: Frames a second.
-        loop: Repeat for ever.
+        loop: Whether the clip repeats for ever.
         quality: 0 to 100.
     """
     alpha = first.shape[2] == 4
@@ -51,15 +51,15 @@ def movie_of(
 
 @dataclass(frozen=True)
 class _Coding:
-    """How FFmpeg is to write a file.
+    """Settings with which FFmpeg writes a file.
 
     Attributes:
-        container: Its name for the type of file.
-        codec: Its name for the encoder.
-        pixels: Its name for the layout of pixels.
-        options: Of the encoder.
-        muxing: Of the container.
-        ticks: In a second, if the file counts time by them; else it counts frames.
+        container: FFmpeg's name of the file type.
+        codec: FFmpeg's name of the encoder.
+        pixels: FFmpeg's name of the pixel format.
+        options: Options of the encoder.
+        muxing: Options of the container.
+        ticks: Ticks a second, if the file counts time in ticks; None if it counts frames.
     """
 
     container: str
@@ -71,7 +71,7 @@ class _Coding:
 
     @property
     def is_video(self) -> bool:
-        """Colours are Y'CbCr in the limited range, and sides even."""
+        """Whether colours are Y'CbCr in the limited range, and sides even."""
         return self.pixels.startswith("yuv")
 
 
@@ -88,7 +88,7 @@ def _webm(alpha: bool, quality: int) -> _Coding:
 
 
 def _webp(loop: bool, quality: int, lossless: bool) -> _Coding:
-    # With a lossless picture, quality is the effort.
+    # For lossless WebP, the option `quality` means effort.
     options = {"lossless": str(int(lossless)), "quality": str(50 if lossless else quality)}
     muxing = {"loop": str(int(not loop))}
     return _Coding("webp", "libwebp_anim", "bgra", options, muxing, 1000)
@@ -106,11 +106,10 @@ def _gif(loop: bool) -> _Coding:
 
 
 class _Movie:
-    """A file that FFmpeg writes.
+    """File that FFmpeg writes.
 
-    Video is converted with the matrix of ITU-R BT.709 and says so; its primaries are those of sRGB,
-    and the transfer function is called what it is, that of sRGB (ITU-T H.273, code points 1 and
-    13).
+    Video is converted with the matrix of ITU-R BT.709, and the file says so. Its primaries and its
+    transfer function are marked as those of sRGB (ITU-T H.273, code points 1 and 13).
     """
 
     def __init__(
@@ -132,7 +131,7 @@ class _Movie:
         stream.width, stream.height, stream.pix_fmt = width, height, coding.pixels
         context = stream.codec_context
         context.time_base = Fraction(1, coding.ticks) if coding.ticks else 1 / rate
-        # What the encoders write depends on the number of threads.
+        # The bytes that encoders write depend on the number of threads.
         context.thread_count = 1
         context.flags |= av.codec.context.Flags.bitexact
         if coding.is_video:
@@ -143,7 +142,7 @@ class _Movie:
 
     @cached_property
     def _converter(self) -> Graph:
-        """From the pixels of frames to those of the encoder."""
+        """Filter from the pixels of frames to those of the encoder."""
         steps = [("format", f"pix_fmts={self._coding.pixels}")]
         if self._coding.is_video:
             flags = "bicubic+accurate_rnd+full_chroma_int+full_chroma_inp"
@@ -151,14 +150,14 @@ class _Movie:
         return graph(steps, [self._input])
 
     def add(self, frame: Frame) -> None:
-        """Takes the next frame."""
+        """Takes the next frame, uint8 [H, W, 3 or 4]."""
         if self._coding.is_video:
             frame = np.pad(frame, self._pad, mode="edge")
         self._converter.push(video_frame(frame, self._count))
         self.encode(next(pulled(self._converter)))
 
     def encode(self, picture: VideoFrame) -> None:
-        """Takes a frame as the encoder wants it."""
+        """Encodes a frame that is in the pixel format of the encoder."""
         ticks = self._coding.ticks
         picture.pts = round(self._count * ticks / self._rate) if ticks else self._count
         picture.time_base = self._stream.codec_context.time_base
@@ -173,17 +172,18 @@ class _Movie:
         self._container.close()
 
     def close(self) -> None:
-        """Lets go of the file."""
-        # After a failure it would complete the file, which may fail again and matters to nobody.
+        """Closes the file."""
+        # After a failure, closing tries to complete the file; it does not matter if that fails too.
         with contextlib.suppress(*write_errors()):
             self._container.close()
 
 
 class _Gif:
-    """A GIF of one palette for all frames, which are therefore seen twice.
+    """GIF with one palette for all frames, which are therefore read twice.
 
-    A palette a frame made files 1.3 to 2.3 times as large, and flickered; error diffusion is nearer
-    to the colours than an ordered pattern, and FFmpeg confines it to the box of what moves.
+    With a palette for each frame, files were 1.3 to 2.3 times as large, and flickered. Error
+    diffusion is nearer to the colours than an ordered pattern, and FFmpeg confines it to the box of
+    the pixels that change.
     """
 
     def __init__(self, file: Path, first: Frame, rate: Fraction, loop: bool) -> None:
@@ -195,7 +195,7 @@ class _Gif:
         self._palette = graph([("palettegen", "stats_mode=full")], [self._input])
 
     def add(self, frame: Frame) -> None:
-        """Takes the next frame."""
+        """Takes the next frame, uint8 [H, W, 3 or 4]."""
         with open(self._spool, "ab") as spool:
             spool.write(frame.data)
         self._palette.push(video_frame(frame, self._count))
@@ -225,12 +225,15 @@ class _Gif:
             self._movie.encode(picture)
 
     def close(self) -> None:
-        """Lets go of the file."""
+        """Closes the file."""
         self._movie.close()
 
 
 def _lossless_is_no_larger(first: Frame, quality: int) -> bool:
-    """Whether the first frame, as WebP, is no larger without loss: true of flat drawings."""
+    """Whether the first frame as lossless WebP is no larger than as lossy WebP.
+
+    It is for flat drawings.
+    """
     sizes = []
     for lossless in (True, False):
         buffer = io.BytesIO()

@@ -1,4 +1,4 @@
-"""A clip as PNG files: one a frame, or a sprite sheet. See `clip` for what a coder does."""
+"""Clips as PNG files, one for each frame, or as a sprite sheet; see `clip` for the coders."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Frame = NDArray[np.uint8]
 
 
 class Numbered:
-    """One PNG file a frame."""
+    """Coder that writes one PNG file for each frame."""
 
     def __init__(self, target: Target, stage: Path) -> None:
         self._target = target
@@ -25,23 +25,23 @@ class Numbered:
         self._count = 0
 
     def add(self, frame: Frame) -> None:
-        """Takes the next frame."""
+        """Writes the next frame, uint8 [H, W, 3 or 4]."""
         name = self._target.numbered(self._count).name
         (self._stage / name).write_bytes(encode_png(frame))
         self._count += 1
 
     def finish(self) -> None:
-        """Nothing is left to do."""
+        """Does nothing, because each frame is written at once."""
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Does nothing, because no file is open."""
 
 
 class Sheet:
-    """One PNG file of all frames, row by row, nearly square, and its map.
+    """Coder that writes all frames into one PNG file, row by row, nearly square, and its map.
 
     The map is the JSON (hash) that TexturePacker and Aseprite export, and that Phaser, PixiJS and
-    others read; with the grid for those who only count.
+    others read. It also has the grid, for programs that only count.
     """
 
     def __init__(self, target: Target, stage: Path, rate: Fraction, loop: bool) -> None:
@@ -52,11 +52,11 @@ class Sheet:
         self._frames: list[Frame] = []
 
     def add(self, frame: Frame) -> None:
-        """Takes the next frame."""
+        """Keeps the next frame, uint8 [H, W, 3 or 4], until `finish`."""
         self._frames.append(frame)
 
     def finish(self) -> None:
-        """Writes the files."""
+        """Writes the sheet and its map."""
         count = len(self._frames)
         height, width, channels = self._frames[0].shape
         columns = min(count, math.ceil(math.sqrt(count * height / width)))
@@ -96,4 +96,4 @@ class Sheet:
         (self._stage / self._target.sidecar.name).write_text(text + "\n", encoding="utf-8")
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Does nothing, because no file is open."""

@@ -1,7 +1,7 @@
-"""Where a clip can go, told from the name alone.
+"""Targets of clips, recognized by their names alone.
 
 ========================  ==========================================================  =====
-Target                    What is written                                             alpha
+Target                    Content                                                     alpha
 ========================  ==========================================================  =====
 ``NAME.mp4``              H.264, 4:2:0, playable while it loads                       no
 ``NAME.webm``             VP9, 4:2:0                                                  yes
@@ -24,19 +24,20 @@ from pathlib import Path
 from ..errors import UsageError
 
 SLOWEST = 0.01
-"""Frames a second."""
+"""Lowest frame rate, in frames a second."""
 
 _NUMBER = re.compile(r"%(?:0([1-9]))?d")
 
 
 @dataclass(frozen=True)
 class Kind:
-    """What a type of target can hold.
+    """Bounds of a kind of target.
 
     Attributes:
-        alpha_bits: 8, 1 (each pixel is clear or opaque) or 0 (composited over a background).
-        fastest: Frames a second.
-        longest_side: Pixels.
+        alpha_bits: Bits of transparency a pixel: 8, 1 (clear or opaque), or 0 (composited over a
+            background).
+        fastest: Highest frame rate, in frames a second.
+        longest_side: Largest width and height in pixels.
     """
 
     alpha_bits: int
@@ -58,11 +59,11 @@ KINDS = {
 
 @dataclass(frozen=True)
 class Target:
-    """Where a clip goes.
+    """Target of a clip.
 
     Attributes:
         kind: ``mp4``, ``webm``, ``webp``, ``gif``, ``apng``, ``frames`` or ``sheet``.
-        path: The file; of frames the pattern, whose name has one ``%d`` or ``%04d``.
+        path: The file; for ``frames`` a pattern, whose name has one ``%d`` or ``%04d``.
     """
 
     kind: str
@@ -70,31 +71,31 @@ class Target:
 
     @property
     def alpha_bits(self) -> int:
-        """How many bits a pixel are kept of transparency: 8, 1 (GIF) or 0 (MP4)."""
+        """Bits of transparency that are kept a pixel: 8, 1 (GIF) or 0 (MP4)."""
         return KINDS[self.kind].alpha_bits
 
     @property
     def first(self) -> Path:
-        """The file that exists if there is such a clip already."""
+        """File whose existence tells that there is such a clip already."""
         return self.numbered(0) if self.kind == "frames" else self.path
 
     @property
     def sidecar(self) -> Path:
-        """The map of a sprite sheet."""
+        """Map of a sprite sheet, a JSON file."""
         return self.path.with_suffix(".json")
 
     def numbered(self, k: int) -> Path:
-        """The file of frame `k`, of a pattern."""
+        """File of frame `k`, for a pattern."""
         name = _NUMBER.sub(lambda match: f"{k:0{match[1] or 1}d}", self.path.name)
         return self.path.with_name(name)
 
 
 def target_of(path: str, sheet: bool = False) -> Target:
-    """What to write to `path`, by its name alone.
+    """Recognizes a target by its name.
 
     Args:
-        path: As in the table of this module.
-        sheet: A ``.png`` is a sprite sheet.
+        path: A name as in the table of this module.
+        sheet: Whether a ``.png`` is a sprite sheet.
 
     Raises:
         UsageError: No clip can be written under such a name.

@@ -1,4 +1,4 @@
-"""What exports of layers share: which layers, where they are, and how they look by themselves."""
+"""Helpers of the exports of layers: the chosen layers, their regions, their opacity."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from ..render.pixels import selected
 def chosen_layers(
     picture: Picture, layers: Sequence[str | int] | None, background: bool
 ) -> list[Layer]:
-    """The layers to export, back to front; by default all, hidden ones too.
+    """Layers to export, back to front; by default all, including hidden ones.
 
     Raises:
-        UsageError: An unknown layer, or none at all.
+        UsageError: A layer is unknown, or none is left.
     """
     return selected(picture, range(len(picture.layers)) if layers is None else layers, background)
 
 
 def region_of(picture: Picture, layer: Layer) -> tuple[int, int, int, int]:
-    """The part of the canvas that holds a layer: x, y, width, height, at least one pixel."""
+    """Part of the canvas that holds a layer: x, y, width, height in pixels, at least one pixel."""
     outline = present_outline(picture, layer)
     if outline is None:
         return 0, 0, picture.width, picture.height
@@ -34,11 +34,11 @@ def region_of(picture: Picture, layer: Layer) -> tuple[int, int, int, int]:
 
 
 def at_full_opacity(picture: Picture) -> Picture:
-    """The picture with all layers at full opacity."""
+    """Picture with all layers at full opacity."""
     layers = [replace(v, pose=replace(v.pose, opacity=OPACITY_MAX)) for v in picture.layers]
     return replace(picture, layers=Layers(layers))
 
 
 def opacity_text(layer: Layer) -> str:
-    """A layer's opacity as a decimal in 0..1."""
+    """Opacity of a layer as a decimal number in 0..1."""
     return f"{layer.pose.opacity / OPACITY_MAX:.6g}"

@@ -1,4 +1,4 @@
-"""FFmpeg through PyAV: frames, and chains of its filters."""
+"""FFmpeg through PyAV: frames, and chains of filters."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
     from av.filter import Graph
 
 Frame = NDArray[np.uint8]
-"""Pixels [H, W, 3 or 4], straight alpha."""
+"""Pixels uint8 [H, W, 3], or [H, W, 4] with straight alpha."""
 
 
 def import_av() -> Any:
-    """PyAV.
+    """Imports PyAV.
 
     Raises:
-        UnsupportedError: It is not installed.
+        UnsupportedError: PyAV is not installed.
     """
     try:
         import av
@@ -36,26 +36,31 @@ def import_av() -> Any:
 
 
 def write_errors() -> tuple[type[Exception], ...]:
-    """What raises where a clip cannot be written."""
+    """Classes of errors that are raised if a clip cannot be written."""
     with contextlib.suppress(UnsupportedError):
         return (OSError, import_av().FFmpegError)
     return (OSError,)
 
 
 def layout_of(frame: Frame) -> str:
-    """FFmpeg's name for the layout of its pixels."""
+    """FFmpeg's name of the pixel format of a frame."""
     return "rgba" if frame.shape[2] == 4 else "rgb24"
 
 
 def video_frame(frame: Frame, number: int) -> VideoFrame:
-    """FFmpeg's view of a frame [H, W, 3 or 4]."""
+    """Wraps a frame, which is shown at tick `number`, for FFmpeg."""
     picture: VideoFrame = import_av().VideoFrame.from_ndarray(frame, layout_of(frame))
     picture.pts = number
     return picture
 
 
 def graph(steps: list[tuple[str, str]], inputs: list[tuple[int, int, str]]) -> Graph:
-    """A chain of FFmpeg's filters; the first has inputs of these widths, heights and layouts."""
+    """Chain of FFmpeg's filters.
+
+    Args:
+        steps: Name and arguments of each filter.
+        inputs: Width, height and pixel format of each input of the first filter.
+    """
     av = import_av()
     chain: Graph = av.filter.Graph()
     chain.threads = 1
@@ -72,7 +77,7 @@ def graph(steps: list[tuple[str, str]], inputs: list[tuple[int, int, str]]) -> G
 
 
 def pulled(chain: Graph) -> Iterator[VideoFrame]:
-    """What the chain has ready."""
+    """Takes all frames that a chain has ready."""
     av = import_av()
     with contextlib.suppress(av.BlockingIOError, av.EOFError):
         while True:

@@ -1,4 +1,4 @@
-"""The engine ``ort``: ONNX Runtime runs the decoder network on features gathered by numpy."""
+"""Engine ``ort``: ONNX Runtime runs the decoder network on features gathered by numpy."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..texture.implicit import ImplicitTexture, Taps
 from ..texture.network import Floats, Network
 
 try:
-    import onnx  # noqa: F401  # said here, before any work is done
+    import onnx  # noqa: F401  # imported here so that it fails before any work is done
     import onnxruntime  # noqa: F401
 except ImportError:
     raise UnsupportedError(
@@ -21,7 +21,7 @@ from .onnx_network import session
 
 
 def run(texture: ImplicitTexture, network: Network, taps: Taps) -> Floats:
-    """Colours [N, channels] at N points; see `render.engines`."""
+    """Colours float32 [N, channels] at N points, not clamped; see `render.engines`."""
     run_network = session(network)
     out = np.empty((len(taps.base), network.shape.channels), np.float32)
     for at, part in in_chunks(taps):

@@ -1,4 +1,4 @@
-"""ONNX graphs from formulas: values with operators, and graphs within graphs."""
+"""Builder of ONNX graphs from formulas: values with operators, and nested graphs."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ OPSET = 18
 IR_VERSION = 8
 
 CONSTANTS_MAX = (1 << 31) - (1 << 24)
-"""Bytes of constants: protobuf ends at 2 GiB, and nodes need some of them."""
+"""Most bytes of constants: a protobuf message has at most 2 GiB, of which nodes need some."""
 
 Shape = Sequence[int | str]
 
 
 @dataclass(frozen=True, eq=False)
 class Value:
-    """A tensor of a graph. Operators add nodes; numbers beside a value get its dtype."""
+    """Tensor of a graph. Its operators add nodes; numbers beside a value get its dtype."""
 
     graph: Graph
     name: str
@@ -70,53 +70,58 @@ class Value:
         return self.graph.op("And", self, other)
 
     def maximum(self, other: Operand) -> Value:
-        """The larger, item by item."""
+        """Element-wise maximum."""
         return self.graph.op("Max", self, other)
 
     def minimum(self, other: Operand) -> Value:
-        """The smaller, item by item."""
+        """Element-wise minimum."""
         return self.graph.op("Min", self, other)
 
     def clip(self, low: Operand, high: Operand) -> Value:
-        """At least `low`, at most `high`."""
+        """Element-wise clamp to `low`..`high`."""
         return self.maximum(low).minimum(high)
 
     def floor(self) -> Value:
-        """Rounded down."""
+        """Element-wise rounding down."""
         return self.graph.op("Floor", self)
 
     def abs(self) -> Value:
-        """The magnitude."""
+        """Element-wise magnitude."""
         return self.graph.op("Abs", self)
 
     def astype(self, dtype: DTypeLike) -> Value:
-        """Cast."""
+        """Cast to another dtype."""
         kind = self.graph.helper.np_dtype_to_tensor_dtype(np.dtype(dtype))
         return self.graph.op("Cast", self, dtype=dtype, to=kind)
 
     def take(self, index: int | Value | NDArray[Any], axis: int = 0) -> Value:
-        """Items along an axis; a single number takes the axis away."""
+        """Items along an axis, by index; a single number removes the axis."""
         if isinstance(index, int):
             index = np.array(index)
         return self.graph.op("Gather", self, index, axis=axis)
 
     def compressed(self, keep: Value, axis: int) -> Value:
-        """Items along an axis where `keep` is true."""
+        """Items along an axis for which `keep` is true."""
         return self.graph.op("Compress", self, keep, axis=axis)
 
     def split(self, parts: int, axis: int) -> list[Value]:
-        """Parts of one item each along an axis of `parts` items, which stays."""
+        """Splits an axis of `parts` items into parts of one item each; the axis is kept."""
         outputs = [Value(self.graph, self.graph._name("Split"), self.dtype) for _ in range(parts)]
         shape = {"axis": axis, "num_outputs": parts}
         self.graph._add("Split", [self], self.dtype, outputs, shape)
         return outputs
 
     def reshape(self, *shape: int) -> Value:
-        """Another shape; 0 keeps an extent, -1 is what remains."""
+        """Reshapes the tensor; an extent of 0 is kept, one of -1 is computed."""
         return self.graph.op("Reshape", self, np.array(shape, np.int64))
 
     def reduced(self, how: str, axis: int | None = None) -> Value:
-        """The ``Sum``, ``Min`` or ``Max`` along an axis, which goes, or of all."""
+        """Reduces an axis, which is removed, or all axes.
+
+        Args:
+            how: ``Sum``, ``Min`` or ``Max``.
+            axis: The axis; None for all.
+        """
         axes = [] if axis is None else [np.array([axis])]
         return self.graph.op(f"Reduce{how}", self, *axes, keepdims=0)
 
@@ -125,10 +130,10 @@ Operand = Value | NDArray[Any] | float
 
 
 class Graph:
-    """A model that grows node by node.
+    """ONNX model that grows node by node.
 
     Attributes:
-        helper: That of onnx.
+        helper: The module `onnx.helper`.
 
     Raises:
         UnsupportedError: onnx is not installed.
@@ -147,13 +152,13 @@ class Graph:
         self._count = 0
 
     def input(self, name: str, dtype: DTypeLike, shape: Shape) -> Value:
-        """An input of the model; names in its shape are dynamic."""
+        """Adds an input of the model; names in its shape are dynamic extents."""
         self._inputs.append(self._described(value := Value(self, name, np.dtype(dtype)), shape))
         return value
 
     def constant(self, array: NDArray[Any]) -> Value:
-        """An initializer; equal arrays are there once."""
-        array = np.ascontiguousarray(array).reshape(array.shape)  # which gives () an axis
+        """Adds an initializer; equal arrays are stored once."""
+        array = np.ascontiguousarray(array).reshape(array.shape)  # a scalar became [1]
         key = array.dtype.str, array.shape, hashlib.sha256(array.data).digest()
         found = self._constants.get(key)
         if found is None:
@@ -170,22 +175,38 @@ class Graph:
         name: str = "",
         **attributes: Any,
     ) -> Value:
-        """A node with one output, which has the dtype of the first value unless told."""
+        """Adds a node with one output.
+
+        Args:
+            kind: The operator of ONNX.
+            *inputs: Values; numbers and arrays become constants.
+            dtype: dtype of the output; that of the first `Value` by default.
+            name: Name of the output.
+            **attributes: Attributes of the node.
+        """
         own = next(v.dtype for v in inputs if isinstance(v, Value))
         output = Value(self, name or self._name(kind), np.dtype(dtype) if dtype else own)
         self._add(kind, inputs, own, [output], attributes)
         return output
 
     def concat(self, values: Sequence[Operand], axis: int) -> Value:
-        """Values one after the other along an axis."""
+        """Concatenates values along an axis."""
         return self.op("Concat", *values, axis=axis)
 
     def where(self, condition: Value, yes: Value, no: Value) -> Value:
-        """Items of `yes` where the condition holds, else of `no`."""
+        """Items of `yes` where the condition holds, otherwise of `no`."""
         return self.op("Where", condition, yes, no, dtype=yes.dtype)
 
     def choose(self, condition: Value, yes: Callable[[], Value], no: Callable[[], Value]) -> Value:
-        """What one of two functions makes; the other's nodes are not run."""
+        """Runs the graph that `yes` builds if the condition holds, otherwise the one of `no`.
+
+        Only the nodes of the chosen graph are computed.
+
+        Args:
+            condition: A single bool.
+            yes: Function that adds the nodes of one graph and returns its output.
+            no: The same for the other graph.
+        """
         made, branches = [], {}
         for key, build in (("then_branch", yes), ("else_branch", no)):
             value, branches[key] = self._nested(build)
@@ -193,7 +214,11 @@ class Graph:
         return self.op("If", condition, dtype=made[0].dtype, **branches)
 
     def scan(self, values: Value, build: Callable[[Value], Value]) -> Value:
-        """What `build` makes of each item along the first axis, stacked along a new one."""
+        """Applies the graph that `build` makes to each item along the first axis of `values`.
+
+        Returns:
+            The results, stacked along a new first axis.
+        """
         item = Value(self, self._name("item"), values.dtype)
         made, body = self._nested(lambda: build(item), [item])
         return self.op("Scan", values, dtype=made.dtype, body=body, num_scan_inputs=1)
@@ -202,10 +227,16 @@ class Graph:
         self, name: str, outputs: Sequence[tuple[Value, Shape]], documentation: str = "",
         metadata: dict[str, str] | None = None,
     ) -> onnx.ModelProto:  # fmt: skip
-        """The finished model, checked.
+        """Finishes the model, and checks it.
+
+        Args:
+            name: Name of the graph.
+            outputs: Outputs and their shapes.
+            documentation: Text for people, stored in the model.
+            metadata: Properties stored in the model.
 
         Raises:
-            UnsupportedError: It would be too large.
+            UnsupportedError: The model would be too large.
         """
         import onnx
         from onnx import numpy_helper
@@ -233,6 +264,7 @@ class Graph:
         self, kind: str, inputs: Sequence[Operand], dtype: np.dtype[Any], outputs: Sequence[Value],
         attributes: dict[str, Any],
     ) -> None:  # fmt: skip
+        """Adds a node to the innermost graph."""
         names = []
         for v in inputs:
             if not isinstance(v, Value):
@@ -244,10 +276,10 @@ class Graph:
     def _nested(
         self, build: Callable[[], Value], inputs: Sequence[Value] = ()
     ) -> tuple[Value, onnx.GraphProto]:
-        """What a function makes, and the graph of the nodes that it added."""
+        """Runs `build`; returns its output, and the graph of the nodes that it added."""
         self._nodes.append([])
         made = build()
-        # An output must be of the graph itself, not one of those around it.
+        # An output must belong to the nested graph itself, not to a graph around it.
         made = self.op("Identity", made)
         given = [self._described(v) for v in inputs]
         name = self._name("graph")

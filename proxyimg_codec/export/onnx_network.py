@@ -1,4 +1,4 @@
-"""The decoder network as ONNX: features in, colour out."""
+"""Export of a decoder network as ONNX: features in, colour out."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 
 
 def build(network: Network) -> onnx.ModelProto:
-    """The model: `features` float32 [N, D] -> `colour` float32 [N, channels], N dynamic.
+    """Builds the model: `features` float32 [N, D] -> `colour` float32 [N, channels], N dynamic.
 
-    The frequency encoding is inside, by double-angle formulas as in
-    `texture.network.encode_features`; weights are dequantized initializers, no external data.
-    Outputs are not clamped.
+    The model includes the frequency encoding, by double-angle formulas as in
+    `texture.network.encode_features`. Weights are dequantized initializers; there is no external
+    data. Outputs are not clamped.
 
     Raises:
         UnsupportedError: onnx is not installed.
@@ -33,12 +33,15 @@ def build(network: Network) -> onnx.ModelProto:
 
 
 def forward(network: Network, features: Value, name: str = "") -> Value:
-    """Outputs float32 [N, channels], not clamped, of features float32 [N, D].
+    """Adds a decoder network to a graph.
 
     Args:
-        network: What decodes.
-        features: Their graph gets the nodes.
-        name: Of the outputs.
+        network: The network.
+        features: float32 [N, D]; the nodes are added to its graph.
+        name: Name of the output.
+
+    Returns:
+        float32 [N, channels] colours, not clamped.
     """
     graph = features.graph
     x = _encoded(features, network.shape.octaves)
@@ -51,7 +54,7 @@ def forward(network: Network, features: Value, name: str = "") -> Value:
 
 
 def _encoded(features: Value, octaves: int) -> Value:
-    """As `texture.network.encode_features`."""
+    """Frequency encoding, as `texture.network.encode_features`."""
     graph, encoded = features.graph, [features]
     if octaves:
         angle = features * math.pi
@@ -66,7 +69,10 @@ def _encoded(features: Value, octaves: int) -> Value:
 
 @functools.lru_cache(maxsize=64)
 def session(network: Network) -> Callable[[Floats], Floats]:
-    """A function that runs the network in onnxruntime on one thread."""
+    """Function that runs a network in ONNX Runtime, on one thread.
+
+    It maps features float32 [N, D] to colours float32 [N, channels], not clamped.
+    """
     import onnxruntime
 
     options = onnxruntime.SessionOptions()

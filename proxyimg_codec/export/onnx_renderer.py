@@ -1,4 +1,4 @@
-"""The whole renderer as ONNX: points of the canvas in, colour out."""
+"""Export of the whole renderer as ONNX: canvas points in, colour out."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import onnx
 
 BLOCK = 1024
-"""Samples at a time: chords and faces that none of them can see are left out."""
+"""Samples computed at a time; chords and faces that affect none of them are left out."""
 
 DOCUMENTATION = f"""\
 A picture as a function of the place: points of its canvas in, colours out.
@@ -45,21 +45,24 @@ time, without what none of them can see. Memory is that of so many, whatever N i
 def build(
     image: Pictured, layers: Sequence[str | int] | None = None, background: bool = True
 ) -> onnx.ModelProto:
-    """The model: `points` float64 [N, 2] and `pixel_size` float64 [2] -> `colour` float32 [N, 4].
+    """Builds the model of a renderer.
+
+    Its inputs are `points` float64 [N, 2] and `pixel_size` float64 [2], its output is `colour`
+    float32 [N, 4]; `DOCUMENTATION` describes them.
 
     Args:
-        image: A still picture: `render.moment.at` gives that of a moment.
-        layers: Names or positions of what is drawn; all that are not hidden by default.
+        image: A picture without motion; `render.moment.at` gives that of a moment.
+        layers: Names or positions of the layers to draw; by default all that are not hidden.
         background: Whether to draw the back layer of an opaque picture.
 
     Raises:
-        UsageError: An unknown layer, or none is left to draw.
+        UsageError: A layer is unknown, or none is left to draw.
         UnsupportedError: onnx is not installed, or the model would be larger than 2 GiB.
     """
     picture = image.picture
     chosen = selected(picture, layers, background)
     graph = Graph()
-    # All that decides is in double precision, as the specification has it.
+    # Computations that decide about geometry are in double precision, as in the specification.
     points = graph.input("points", np.float64, ["N", 2])
     size = graph.input("pixel_size", np.float64, [2])
     first = points.take(0)
@@ -85,6 +88,7 @@ def build(
 
 
 def _documentation(picture: Picture, chosen: Sequence[Layer]) -> str:
+    """Text about the model, which is stored in it."""
     said = [DOCUMENTATION, f"The canvas has {picture.width} by {picture.height} pixels."]
     if picture.opaque and picture.layers[0] in chosen:
         said.append("The picture is opaque: alpha is to be ignored.")
@@ -95,14 +99,17 @@ def _composited(
     picture: Picture, chosen: Sequence[Layer], outlines: Mapping[Layer, Value], at: Value,
     corner: Value,
 ) -> Value:  # fmt: skip
-    """Colour float32 [BLOCK, 4] of all layers, front to back.
+    """Composites all layers, front to back.
 
     Args:
-        picture: What they are layers of.
-        chosen: Them, back to front.
-        outlines: Chords of those that have an outline.
+        picture: The picture.
+        chosen: The layers to draw, back to front.
+        outlines: Chords of the layers that have an outline.
         at: Points [BLOCK, 2].
-        corner: Corners of the samples around them [BLOCK, 2], as `coverage` takes them.
+        corner: Upper left corners of their samples [BLOCK, 2], as `coverage` takes them.
+
+    Returns:
+        float32 [BLOCK, 4] premultiplied colour and alpha.
     """
     graph = at.graph
     result = graph.constant(np.zeros((BLOCK, 4), np.float32))
@@ -119,9 +126,10 @@ def _composited(
 
 
 def _blocks(points: Value) -> tuple[Value, Value]:
-    """Numbers of points int64 [blocks, BLOCK], and how many points there are [1].
+    """Divides points into blocks; the last block is filled up with the last point.
 
-    The last point fills the last block.
+    Returns:
+        Numbers of the points, int64 [blocks, BLOCK]; number of all points, int64 [1].
     """
     graph = points.graph
     count = graph.op("Shape", points, dtype=np.int64, start=0, end=1)
@@ -131,7 +139,7 @@ def _blocks(points: Value) -> tuple[Value, Value]:
 
 
 def _seen(picture: Picture, layer: Layer, at: Value, weight: Value) -> Value:
-    """Colour float32 [BLOCK, 4] of a layer at points, 0 where its weight is 0."""
+    """Colour float32 [BLOCK, 4] of a layer at points; 0 where its weight is 0."""
     graph = at.graph
     nothing = graph.constant(np.zeros((BLOCK, 4), np.float32))
 

@@ -1,4 +1,4 @@
-"""Coverage in the renderer as ONNX: the integers of GEO-7 to GEO-14, in doubles."""
+"""Coverage in the renderer as ONNX: the integers of GEO-7 to GEO-14, in double precision."""
 
 from __future__ import annotations
 
@@ -9,24 +9,25 @@ from ..geometry.coverage import FLATNESS, FULL, MAX_LOG2_CHORDS, ONE, SCALED_MAX
 from .onnx_graph import Graph, Value
 
 TIE = 2.0**-25
-"""Added before rounding: a tie that is missed by the error of a double is still rounded up."""
+"""Added before rounding, so that ties are rounded up in spite of the error of a double."""
 
 FAR = 2.0**40
-"""Farther than any point of a chord, in 1/256 sample."""
+"""Coordinate beyond any point of a chord, in 1/256 sample."""
 
 
 def chords(graph: Graph, boundary: Boundary, corner: Value, size: Value) -> Value:
-    """Chords float64 [6, T] of an outline on the grid of samples: GEO-7 to GEO-9 and GEO-11.
+    """Divides an outline into chords on the grid of samples [GEO-7, GEO-8, GEO-9, GEO-11].
 
     Args:
-        graph: Where they are computed, at the scale that is asked for.
-        boundary: The paths in their present place.
-        corner: [2] canvas point of a corner of the grid.
-        size: [2] width and height of a sample in canvas pixels.
+        graph: The graph; chords are computed in it, for the scale that is asked for.
+        boundary: The outline, in its present place.
+        corner: float64 [2] canvas point of a corner of the grid.
+        size: float64 [2] width and height of a sample in canvas pixels.
 
     Returns:
-        x and y of the upper end, x and y of the lower end, sign, and the smaller x, in 1/256
-        sample from `corner`. The first chord counts nothing and is in reach of every sample.
+        float64 [6, T]: x and y of the upper end, x and y of the lower end, sign, and the smaller x
+        of each chord, in 1/256 sample from `corner`. The first chord counts nothing and is in reach
+        of every sample.
     """
     curves = [
         np.stack([path[0::3], path[1::3], path[2::3], np.roll(path[0::3], -1, 0)])
@@ -62,11 +63,11 @@ def chords(graph: Graph, boundary: Boundary, corner: Value, size: Value) -> Valu
 
 
 def coverage(chords: Value, at: Value) -> Value:
-    """Coverage float32 [N], 0..1, of samples: GEO-12 to GEO-14.
+    """Coverage of samples, float32 [N] in 0..1 [GEO-12, GEO-13, GEO-14].
 
     Args:
-        chords: As `chords` makes them.
-        at: float64 [N, 2] upper left corners in 1/256 sample: whole numbers.
+        chords: float64 [6, T] from the function `chords`.
+        at: float64 [N, 2] upper left corners of the samples, whole numbers in 1/256 sample.
     """
     chords = _in_reach(chords, at)
     xa, ya, xb, yb, sign, _ = chords.split(6, 0)  # [1, C]
@@ -89,7 +90,7 @@ def coverage(chords: Value, at: Value) -> Value:
 
 
 def _in_reach(chords: Value, at: Value) -> Value:
-    """The chords that count at any of the samples: not all above, below or right of them."""
+    """Chords that can affect one of the samples: not above, below or right of all of them."""
     low, high = at.reduced("Min", 0), at.reduced("Max", 0) + ONE
     top, bottom, right = low.take(1), high.take(1), high.take(0)
     near = (chords.take(3) > top) & (chords.take(1) < bottom) & (chords.take(5) < right)

@@ -1,4 +1,4 @@
-"""Colours of textures in the renderer as ONNX: TEX-10 to TEX-23, and PYR-43 and PYR-44."""
+"""Textures in the renderer as ONNX: TEX-10 to TEX-23, PYR-43 and PYR-44."""
 
 from __future__ import annotations
 
@@ -20,11 +20,17 @@ from .onnx_network import forward
 from .onnx_renderer_warp import Shown
 
 SAMPLE_ONE = 65535
-"""The sample 1.0 of a raster as the model stores it."""
+"""Integer that stands for the sample 1.0 of a raster in the model."""
 
 
 def colour(picture: Picture, layer: Layer, shown: Shown) -> Value:
-    """Premultiplied colour and alpha float32 [N, 4] of samples of a layer in its pose."""
+    """Premultiplied colour and alpha float32 [N, 4] of a layer in its pose.
+
+    Args:
+        picture: The picture.
+        layer: The layer.
+        shown: The texture points of the samples.
+    """
     texture, graph = layer.texture, shown.points.graph
     if isinstance(texture, PyramidTexture):
         padded = texture.padded(moved_neighbours(picture, layer))
@@ -41,7 +47,7 @@ def colour(picture: Picture, layer: Layer, shown: Shown) -> Value:
 
 
 def _premultiplied(graph: Graph, output: Value, channels: int) -> Value:
-    """As `render.compose.premultiplied`."""
+    """Premultiplied colour, as `render.compose.premultiplied`."""
     output = graph.where(
         graph.op("IsNaN", output, dtype=bool), graph.constant(np.array(0, np.float32)), output
     )
@@ -54,7 +60,7 @@ def _premultiplied(graph: Graph, output: Value, channels: int) -> Value:
 
 
 def _posed(pose: Pose, colour: Value) -> Value:
-    """As `render.compose` shows a colour in a pose."""
+    """Colour changed by the pose of a layer, as in `render.compose`."""
     graph = colour.graph
     if pose.colour:
         matrix = np.array(pose.colour, np.float32).reshape(3, 4).T / (1 << COLOUR_BITS)
@@ -65,7 +71,7 @@ def _posed(pose: Pose, colour: Value) -> Value:
 
 
 def _features(layer: Layer, texture: ImplicitTexture, shown: Shown) -> Value:
-    """Features float32 [N, D] at points: TEX-11 and TEX-12."""
+    """Features float32 [N, D] at points [TEX-11, TEX-12]."""
     graph = shown.points.graph
     columns, rows = texture.grid
     x0, y0, width, height = layer.box
@@ -79,26 +85,32 @@ def _features(layer: Layer, texture: ImplicitTexture, shown: Shown) -> Value:
 
 
 def _codes(texture: ImplicitTexture) -> NDArray[np.int16]:
-    """Filled codes int16 [rows * columns, D] in 1/256 code."""
+    """Codes, filled where none are stored, int16 [rows * columns, D] in 1/256 code."""
     filled = diffusion.fill(texture.codes, texture.stored)
     return np.moveaxis(filled, 0, -1).reshape(-1, len(texture.steps)).astype(np.int16)
 
 
 def _gathered(table: NDArray[Any], index: Value, weights: Value) -> Value:
-    """The sums float32 [N, C] of rows of a table [R, C], by index and weight [N, taps]."""
+    """Weighted sums float32 [N, C] of rows of a table.
+
+    Args:
+        table: [R, C] table.
+        index: int64 [N, taps] rows.
+        weights: float32 [N, taps].
+    """
     rows = index.graph.constant(table).take(index).astype(np.float32)
     return (rows * weights.reshape(0, -1, 1)).reduced("Sum", 1)
 
 
 def _before(points: Value, axis: int, start: int, scale: float, count: int) -> tuple[Value, Value]:
-    """Codes int64 [N, 1] before points on an axis, and fractions float32 [N, 1]."""
+    """Codes before points on an axis, int64 [N, 1], and fractions to the next, float32 [N, 1]."""
     at = ((points.take(np.array([axis]), 1) - start) * scale).clip(0, count - 1)
     before = at.floor().minimum(count - 2)
     return before.astype(np.int64), (at - before).astype(np.float32)
 
 
 def _at_nodes(picture: Picture, layer: Layer, texture: ImplicitTexture, shown: Shown) -> Value:
-    """Features float32 [N, D] of a layer with node sampling: TEX-20 to TEX-23."""
+    """Features float32 [N, D] of a layer with node sampling [TEX-20, TEX-21, TEX-22, TEX-23]."""
     graph, parts = shown.points.graph, []
     if layer.sampling != node_sampling.GLOBAL:
         assert layer.mesh is not None, "local features need a mesh"
@@ -119,7 +131,7 @@ def _at_nodes(picture: Picture, layer: Layer, texture: ImplicitTexture, shown: S
 
 
 def _sampled(layer: Layer, texture: PyramidTexture, padded: Floats, points: Value) -> Value:
-    """Cubic convolution of a raster, float32 [N, channels], not clamped: PYR-43."""
+    """Raster interpolated by cubic convolution, float32 [N, channels], not clamped [PYR-43]."""
     stride = padded.shape[1]
     table = np.rint(padded.reshape(-1, padded.shape[2]) * SAMPLE_ONE).astype(np.uint16)
     columns, across = _taps(points, 0, layer.box[0], layer.box[2], texture.part[2])
@@ -131,7 +143,7 @@ def _sampled(layer: Layer, texture: PyramidTexture, padded: Floats, points: Valu
 
 
 def _taps(points: Value, axis: int, start: int, extent: int, samples: int) -> tuple[Value, Value]:
-    """The sample int64 [N, 1] before each point on an axis, and weights float32 [N, 4]."""
+    """Sample before each point on an axis, int64 [N, 1], and weights float32 [N, 4]."""
     at = (points.take(np.array([axis]), 1) - start) * (samples / extent) - 0.5
     at = at.clip(0, samples - 1)
     before = at.floor()

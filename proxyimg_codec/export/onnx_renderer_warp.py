@@ -1,4 +1,4 @@
-"""Texture points in the renderer as ONNX: MSH-30 to MSH-33."""
+"""Warp in the renderer as ONNX: texture points, MSH-30 to MSH-33."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from ..model import Layer
 from .onnx_graph import Value
 
 NEAR = 2.0**-26
-"""How far outside of a face, in canvas pixels, a sample is still on its edge."""
+"""Distance outside of a face, in canvas pixels, at which a sample still counts as on its edge."""
 
 FAR = 2.0**40
-"""Farther than any node, in canvas pixels."""
+"""Coordinate beyond any node, in canvas pixels."""
 
 Reals = NDArray[np.float64]
 
 
 class Shown(NamedTuple):
-    """Samples on a layer.
+    """Texture points that samples on a layer show.
 
     Attributes:
-        points: float64 [N, 2] the points of the texture that they show.
-        face: int64 [N] the face that each lies in, or None where no mesh was needed.
-        weights: float64 [N, 3] its weights there, or None.
+        points: float64 [N, 2] texture points.
+        face: int64 [N] face that each sample lies in, or None if no mesh was needed.
+        weights: float64 [N, 3] barycentric weights in that face, or None.
     """
 
     points: Value
@@ -36,7 +36,7 @@ class Shown(NamedTuple):
 
 
 def locate(layer: Layer, at: Value) -> Shown:
-    """What a layer shows at canvas points float64 [N, 2]."""
+    """Texture points that a layer shows at canvas points float64 [N, 2]."""
     warp = Warp(layer.pose, layer.mesh, layer.sampling in (1, 2))
     if warp.meshed:
         return _on_faces(warp, layer, at)
@@ -49,6 +49,7 @@ def locate(layer: Layer, at: Value) -> Shown:
 
 
 def _on_faces(warp: Warp, layer: Layer, at: Value) -> Shown:
+    """Texture points of samples on the faces of a mesh."""
     graph = at.graph
     face = _faces(warp, layer, at)
     x, y = at.split(2, 1)
@@ -68,13 +69,13 @@ def _on_faces(warp: Warp, layer: Layer, at: Value) -> Shown:
 
 
 def _faces(warp: Warp, layer: Layer, at: Value) -> Value:
-    """The face int64 [N] of each sample: MSH-31."""
+    """Face of each sample, int64 [N] [MSH-31]."""
     graph, corners = at.graph, warp._corners
     edges = np.roll(corners, -1, 1) - corners
     area = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
     solid = np.flatnonzero(area)
     if not len(solid):
-        solid = np.arange(1)  # what is shown is not specified
+        solid = np.arange(1)  # the specification leaves open which face is shown
     turned = (area[solid] < 0) != layer.pose.mirrored
     order = solid[np.argsort(turned, kind="stable")]
     faces = _in_reach(graph.constant(_table(corners[order], edges[order], area[order], order)), at)
@@ -97,11 +98,11 @@ def _faces(warp: Warp, layer: Layer, at: Value) -> Value:
 
 
 def _table(corners: Reals, edges: Reals, area: Reals, number: NDArray[np.int64]) -> Reals:
-    """Columns of faces, the first one holding nothing and in reach of every sample.
+    """Table of faces; its first column holds no sample and is in reach of every sample.
 
     Returns:
-        [14, 1 + faces]: for each edge a, b and c, with a x + b y + c the distance of x, y to the
-        inner side; x0, y0, x1, y1 around the face; its number.
+        float64 [14, 1 + faces]: for each of three edges a, b and c, with a x + b y + c the distance
+        of x, y to the inner side; x0, y0, x1, y1 of the bounding box; number of the face.
     """
     length = np.maximum(np.hypot(edges[..., 0], edges[..., 1]), np.finfo(float).tiny)
     scale = np.sign(area)[:, None] / length
@@ -115,7 +116,7 @@ def _table(corners: Reals, edges: Reals, area: Reals, number: NDArray[np.int64])
 
 
 def _in_reach(faces: Value, at: Value) -> Value:
-    """The faces whose rectangle holds any of the samples' rectangle."""
+    """Faces whose bounding box meets that of the samples."""
     low, high = at.reduced("Min", 0), at.reduced("Max", 0)
     near = (faces.take(9) <= high.take(0)) & (faces.take(10) <= high.take(1))
     near = near & (faces.take(11) >= low.take(0)) & (faces.take(12) >= low.take(1))

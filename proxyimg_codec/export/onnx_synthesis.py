@@ -1,4 +1,4 @@
-"""The synthesis of a pyramid texture as ONNX: latents in, samples out."""
+"""Export of the synthesis of a pyramid texture as ONNX: latents in, samples out."""
 
 from __future__ import annotations
 
@@ -27,25 +27,25 @@ grey alone, straight, in 0..1."""
 
 
 def feed(latents: Latents) -> dict[str, Floats]:
-    """Latents as the model takes them: inputs by name.
+    """Inputs of the model by name, float32 [1, channels, rows, columns] each.
 
     Args:
-        latents: Those of the planes that the model was built for: `Planes.latents`.
+        latents: Latents of the planes that the model was built for, from `Planes.latents`.
     """
     inputs = {f"level_{k}": y for k, y in enumerate(latents.levels, 1)} | {"lowest": latents.lowest}
     return {name: y[None].astype(np.float32) for name, y in inputs.items()}
 
 
 def build(planes: Planes) -> onnx.ModelProto:
-    """The model: `lowest` float32 [1, 3, h, w], `level_k` float32 [1, 9, ..] -> `samples`.
+    """Builds the model: `lowest` [1, 3, h, w] and `level_k` [1, 9, h', w'] -> `samples`.
 
-    `samples` are float32 [1, rows, columns, components] in 0..1, those of `Planes.raster`. Shapes
-    are fixed: with L levels, level k has ceil(rows / 2**L) 2**(L - k) rows, columns likewise, and
-    the lowest planes have those of level L. Step and weights are initializers, no external data.
-    The latents are not inside.
+    All are float32. `samples` [1, rows, columns, components] in 0..1 are those of `Planes.raster`.
+    Shapes are fixed: of L levels, level k has ceil(rows / 2**L) 2**(L - k) rows, and columns
+    likewise; the lowest planes have those of level L. Step and weights are initializers; there is
+    no external data. The latents are not part of the model.
 
     Raises:
-        UnsupportedError: onnx is not installed, or the model of the planes is not known.
+        UnsupportedError: onnx is not installed, or the model number of the planes is unknown.
     """
     graph = Graph()
     weights = registered_model.registered(planes.packed["model"])
@@ -65,7 +65,7 @@ def build(planes: Planes) -> onnx.ModelProto:
 def _finer(
     net: registered_model.Synthesis, step: int, low: Value, latents: Value, shape: tuple[int, int]
 ) -> Value:
-    """The next finer planes [1, 3, 2h, 2w]; as in `texture.synthesis`."""
+    """Next finer planes [1, 3, 2h, 2w], as in `texture.synthesis`."""
     graph = low.graph
     t = np.float32((step - registered_model.STEP_ORIGIN) / 128)
     gain = np.exp(net.gain.floats + net.gain_by_step.floats * t).reshape(1, 9, 1, 1)
@@ -85,7 +85,7 @@ def _finer(
 
 
 def _extended(low: Value, high: Value, shape: tuple[int, int]) -> Value:
-    """Low and then high bands [1, 12, h + 4, w + 4], mirrored as the wavelet needs it."""
+    """Low bands, then high bands [1, 12, h + 4, w + 4], mirrored as the wavelet needs it."""
 
     def mirrored(plane: Value, ways: tuple[int, int]) -> Value:
         for axis, n, way in zip((2, 3), shape, ways, strict=True):
@@ -98,7 +98,7 @@ def _extended(low: Value, high: Value, shape: tuple[int, int]) -> Value:
 
 
 def _coloured(weights: registered_model.Model, planes: Planes, low: Value) -> Value:
-    """`samples` of the finest planes [1, 3, h, w]."""
+    """Output `samples` from the finest planes [1, 3, h, w]."""
     graph, (columns, rows) = low.graph, planes.size
     to_colour = weights.to_colour.floats * np.float32(2 ** (planes.packed["step"] / 64) / 255)
     if planes.components == 1:

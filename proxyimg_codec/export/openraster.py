@@ -1,7 +1,7 @@
-"""A picture as OpenRaster (.ora): one PNG a layer, hidden parts included.
+"""Export to OpenRaster (.ora): one PNG file for each layer, hidden parts included.
 
-Follows the OpenRaster baseline (https://www.openraster.org/baseline/, 0.0.5), which Krita, GIMP
-and MyPaint open. The layers composite to the rendered picture with plain source-over.
+The files follow the OpenRaster baseline (https://www.openraster.org/baseline/, 0.0.5), which Krita,
+GIMP and MyPaint open. With plain source-over compositing, the layers give the rendered picture.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from .common import at_full_opacity, chosen_layers, opacity_text, region_of
 THUMBNAIL_SIDE = 256
 
 Draw = Callable[..., NDArray[Any]]
-"""`render.pixels.render`, with some of its arguments given."""
+"""`render.pixels.render` with some arguments bound."""
 
 
 def build(
@@ -40,7 +40,7 @@ def build(
     limits: Limits = DEFAULT_LIMITS,
     progress: Callable[[int], None] | None = None,
 ) -> bytes:
-    """The bytes of an OpenRaster file.
+    """Bytes of an OpenRaster file.
 
     Layers are rendered visible and at full opacity, clipped to the canvas, and cropped to the
     pixels that are not empty; visibility and opacity are attributes.
@@ -49,13 +49,13 @@ def build(
         image: The picture.
         layers: Names or positions of the layers to write; all by default.
         background: Whether to write the back layer of an opaque picture.
-        dtype: uint8 or uint16 samples.
+        dtype: uint8 or uint16, type of the samples.
         engine: As in `render.pixels.render`.
-        limits: Bounds each rendering.
+        limits: Bounds on each rendering.
         progress: Called with 1 after each layer.
 
     Raises:
-        UsageError: An unknown layer, none at all, or another `dtype`.
+        UsageError: A layer is unknown, none is left, or `dtype` is another type.
         LimitError: The canvas is too large.
     """
     picture = image.picture
@@ -69,7 +69,7 @@ def build(
 def _layers(
     picture: Picture, chosen: Sequence[Layer], draw: Draw, progress: Callable[[int], None]
 ) -> dict[str, bytes]:
-    """Files of the layers, front to back, and of the stack that they make."""
+    """Files of the layers, front to back, and stack.xml, which lists them."""
     width, height = picture.size
     size = {"w": str(width), "h": str(height), "xres": "72", "yres": "72"}
     root = ElementTree.Element("image", {"version": "0.0.5", **size})
@@ -88,7 +88,7 @@ def _layers(
 
 
 def _flat(picture: Picture, shown: list[str], draw: Draw, dtype: Any) -> dict[str, bytes]:
-    """Files of the layers `shown` as one picture, and of its thumbnail."""
+    """Files of the flat picture of the layers `shown`, and of its thumbnail."""
 
     def png(width: int, height: int, dtype: Any) -> bytes:
         if shown:
@@ -107,11 +107,12 @@ def _flat(picture: Picture, shown: list[str], draw: Draw, dtype: Any) -> dict[st
 
 
 def _profile(picture: Picture) -> dict[str, bytes]:
+    """Metadata for PNG files: the ICC profile, if there is one."""
     return {k: v for k, v in picture.blocks.items() if k == "icc"}
 
 
 def _attributes(layer: Layer, source: str, x: int, y: int) -> dict[str, str]:
-    """What stack.xml says of a layer whose pixels lie at x, y."""
+    """Attributes in stack.xml of a layer whose pixels begin at x, y."""
     return {
         "name": xml.text(layer.name),
         "src": source,
@@ -124,7 +125,7 @@ def _attributes(layer: Layer, source: str, x: int, y: int) -> dict[str, str]:
 
 
 def _cropped(pixels: NDArray[Any]) -> tuple[NDArray[Any], int, int]:
-    """The smallest rectangle with all that is not transparent, and its x and y."""
+    """Smallest rectangle with all pixels that are not transparent, and its x and y."""
     if pixels.shape[2] == 3:
         return pixels, 0, 0
     solid = pixels[..., 3] > 0
@@ -136,7 +137,7 @@ def _cropped(pixels: NDArray[Any]) -> tuple[NDArray[Any], int, int]:
 
 
 def _zipped(parts: dict[str, bytes]) -> bytes:
-    """A ZIP archive in the given order, the same bytes whenever it is made."""
+    """ZIP archive of files in the given order; its bytes do not depend on the time."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         for name, data in parts.items():

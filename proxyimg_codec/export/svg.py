@@ -1,4 +1,4 @@
-"""The outlines of a picture's layers as SVG, exact to the last bit."""
+"""Export of the outlines of layers as SVG, exact to the last bit."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ NAMESPACE = "http://www.w3.org/2000/svg"
 INKSCAPE = "http://www.inkscape.org/namespaces/inkscape"
 
 SWATCH = 64
-"""Most samples a side that a layer's mean colour is taken from."""
+"""Most samples in a row or column from which the mean colour of a layer is computed."""
 
 
 def build(
@@ -32,11 +32,11 @@ def build(
     background: bool = True,
     engine: str = "auto",
 ) -> bytes:
-    """An SVG file with one element a layer, back to front.
+    """Bytes of an SVG file with one element for each layer, back to front.
 
-    A layer is a path with its control points as exact decimals, or a rectangle where it covers the
-    whole canvas, filled with its mean colour. Its name is the Inkscape label; `identifiers` makes
-    the id.
+    A layer is a path with its control points as exact decimal numbers, or a rectangle if it covers
+    the whole canvas. It is filled with its mean colour. Its name is the Inkscape label, and
+    `identifiers` makes its id.
 
     Args:
         image: The picture.
@@ -45,7 +45,7 @@ def build(
         engine: As in `render.pixels.render`.
 
     Raises:
-        UsageError: An unknown layer, or none at all.
+        UsageError: A layer is unknown, or none is left.
     """
     picture = image.picture
     size = {"width": str(picture.width), "height": str(picture.height)}
@@ -66,7 +66,7 @@ def build(
 
 
 def _look(layer: Layer, identifier: str, colour: str) -> dict[str, str]:
-    """Attributes of a layer's shape, but for its geometry."""
+    """Attributes of the shape of a layer, except for its geometry."""
     look = {"id": identifier, "inkscape:label": xml.text(layer.name), "fill": colour}
     if layer.pose.opacity < OPACITY_MAX:
         look["opacity"] = opacity_text(layer)
@@ -76,7 +76,7 @@ def _look(layer: Layer, identifier: str, colour: str) -> dict[str, str]:
 
 
 def identifiers(names: Sequence[str]) -> list[str]:
-    """An XML id for each name: ASCII letters, digits, ``_``, ``-`` and ``.``; all different."""
+    """XML ids for names: ASCII letters, digits, ``_``, ``-`` and ``.``; all are different."""
     result: list[str] = []
     for name in names:
         plain = re.sub(r"[^\w.-]", "_", name, flags=re.ASCII)
@@ -90,7 +90,7 @@ def identifiers(names: Sequence[str]) -> list[str]:
 
 
 def path_data(boundary: Boundary) -> str:
-    """The ``d`` attribute of a boundary: for each path M, C with all control points, Z."""
+    """Attribute ``d`` of a boundary: for each path M, C with all control points, Z."""
     parts = []
     for path in boundary.paths:
         points = [f"{_decimal(x, boundary.unit)},{_decimal(y, boundary.unit)}" for x, y in path]
@@ -99,13 +99,13 @@ def path_data(boundary: Boundary) -> str:
 
 
 def _decimal(value: int, unit: int) -> str:
-    """`value` times 2**-unit; so many decimals hold it exactly."""
+    """Decimal number `value` times 2**-unit; `unit` decimals hold it exactly."""
     whole = f"{int(value) / (1 << unit):.{unit}f}"
     return whole.rstrip("0").rstrip(".") if "." in whole else whole
 
 
 def _mean_colour(picture: Picture, layer: Layer, engine: str, cache: Cache) -> str:
-    """The mean colour of a layer's pixels, ``#rrggbb``; black if it has none on the canvas."""
+    """Mean colour of the pixels of a layer, ``#rrggbb``; black if none are on the canvas."""
     region = region_of(picture, layer)
     width, height = (min(n, SWATCH) for n in region[2:])
     pixels: NDArray[np.float32] = render(

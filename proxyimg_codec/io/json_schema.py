@@ -1,7 +1,7 @@
-"""Checks JSON values against the part of JSON Schema that the schemas of this package use.
+"""Checker of JSON values against the part of JSON Schema that this package uses.
 
-Unlike a general validator it needs nothing installed, refuses numbers that are not finite, and
-says what is wrong in one line that names the place.
+Unlike a general validator it needs no other package, refuses numbers that are not finite, and gives
+an error message of one line that names the place.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any
 from ..errors import UsageError
 
 Rule = Mapping[str, Any]
-"""A schema, or a part of one."""
+"""A schema or a part of one."""
 
 TYPES: dict[str, tuple[type, ...]] = {
     "object": (dict,),
@@ -37,37 +37,38 @@ def check(
     *,
     whole_floats: bool = True,
 ) -> None:
-    """Checks a JSON value.
+    """Checks a JSON value against a schema.
 
-    Known are `type`, `const`, `enum`, `minimum`, `maximum`, `exclusiveMinimum` (of 0), `pattern`,
-    `items`, `minItems`, `maxItems`, `properties`, `additionalProperties`, `required`,
-    `dependentRequired`, `minProperties`, `maxProperties`, `$ref`, and `anyOf` of one definition
+    Known keywords are `type`, `const`, `enum`, `minimum`, `maximum`, `exclusiveMinimum` (only 0),
+    `pattern`, `items`, `minItems`, `maxItems`, `properties`, `additionalProperties`, `required`,
+    `dependentRequired`, `minProperties`, `maxProperties` and `$ref`; and `anyOf` of one definition
     with an enum and others with properties.
 
     Args:
-        value: What `json.loads` gives.
-        rule: The schema that it has to meet.
-        definitions: Schemas by name, which ``"$ref": "#/$defs/name"`` stands for.
-        whole_floats: Whether 2.0 is a whole number, as JSON Schema has it.
+        value: A value as `json.loads` returns it.
+        rule: The schema.
+        definitions: Schemas by name, which ``"$ref": "#/$defs/name"`` refers to.
+        whole_floats: Whether 2.0 is an integer, as in JSON Schema.
 
     Raises:
-        UsageError: It breaks a rule; the error names the place, such as ``layers.hair.pins[0]``,
-            what is wrong, and what may be.
+        UsageError: The value breaks a rule. The message names the place, such as
+            ``layers.hair.pins[0]``, the problem, and what is allowed.
     """
     _Check(definitions or {}, whole_floats).value(value, rule, "")
 
 
 class _Check:
-    """The check of one value."""
+    """Check of one value."""
 
     def __init__(self, definitions: Mapping[str, Rule], whole_floats: bool) -> None:
         self._definitions, self._whole_floats = definitions, whole_floats
 
     def _named(self, reference: Rule) -> Rule:
+        """Definition that a reference names."""
         return self._definitions[reference["$ref"].rsplit("/", 1)[1]]
 
     def value(self, value: Any, rule: Rule, path: str) -> None:
-        """Checks what stands at `path`."""
+        """Checks the value at the place `path`."""
         if "$ref" in rule:
             rule = {**self._named(rule), **rule}
         place = f"{path}: " if path else ""
@@ -86,6 +87,7 @@ class _Check:
             self._any_of(value, [self._named(r) for r in rule["anyOf"]], path, place)
 
     def _kind(self, value: Any, rule: Rule, place: str) -> None:
+        """Checks `type`, `const` and `enum`."""
         kinds = rule.get("type", [])
         kinds = [kinds] if isinstance(kinds, str) else kinds
         if kinds and not any(self._is(value, kind) for kind in kinds):
@@ -97,12 +99,14 @@ class _Check:
             raise UsageError(f"{place}{_shown(value)} is none of {', '.join(rule['enum'])}")
 
     def _is(self, value: Any, kind: str) -> bool:
+        """Whether a value is of a type; booleans are not numbers."""
         if isinstance(value, bool):
             return kind == "boolean"
         whole = self._whole_floats and isinstance(value, float) and value.is_integer()
         return isinstance(value, TYPES[kind]) or (kind == "integer" and whole)
 
     def _object(self, value: dict[str, Any], rule: Rule, path: str, place: str) -> None:
+        """Checks the keys and values of an object."""
         known, more = rule.get("properties", {}), rule.get("additionalProperties", {})
         for key, item in value.items():
             if key not in known and more is False:
@@ -117,7 +121,7 @@ class _Check:
         _check_size(len(value), rule, "Properties", place)
 
     def _any_of(self, value: Any, rules: Sequence[Rule], path: str, place: str) -> None:
-        """Checks against that one of several rules which the value seems meant for."""
+        """Checks a value against the one of several rules that it seems to be meant for."""
         plain = next(r for r in rules if "enum" in r)
         objects = [r for r in rules if "properties" in r]
         if isinstance(value, str):
@@ -133,7 +137,7 @@ class _Check:
 
 
 def _check_number(value: float, rule: Rule, place: str) -> None:
-    # A whole number may be too large for a float.
+    # Only floats are tested: a large integer cannot be converted to one.
     if isinstance(value, float) and not math.isfinite(value):
         raise UsageError(f"{place}{value} is not a finite number")
     if "exclusiveMinimum" in rule and value <= rule["exclusiveMinimum"]:
@@ -150,6 +154,7 @@ def _check_text(value: str, rule: Rule, place: str) -> None:
 
 
 def _check_size(size: int, rule: Rule, what: str, place: str) -> None:
+    """Checks the number of items of a list, or of keys of an object."""
     least, most = rule.get(f"min{what}", 0), rule.get(f"max{what}", math.inf)
     if not least <= size <= most:
         wanted = f"{least}" if least == most else f"{least} to {most}"
@@ -157,7 +162,7 @@ def _check_size(size: int, rule: Rule, what: str, place: str) -> None:
 
 
 def _shown(value: Any) -> str:
-    """A value as JSON, cut if long."""
+    """Formats a value as JSON, cut if it is long."""
     try:
         text = json.dumps(value)
     except (TypeError, ValueError, RecursionError):

@@ -1,7 +1,7 @@
-"""The stream of latents: lowest planes first, then levels, each coded in the context before it.
+"""Stream of latents: the lowest planes, then the levels, each in the context of those before.
 
-`steps` is the way through it for both `Encoder` and `Decoder`: at each place the one puts the
-latents that are given, and the other finds them.
+`steps` goes through the stream for both `Encoder` and `Decoder`. At each place, an encoder writes
+the given latents, and a decoder reads them.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from . import context, context_native, registered_model
 from .context import Ints
 
 SHIFT_ORIGIN = 8
-"""A stored shift of the scale index is greater by this."""
+"""Number added to a shift of the scale index when it is stored."""
 
 
 class Latents(NamedTuple):
-    """Whole numbers that a raster is made of.
+    """Integers that a raster is decoded from.
 
     Attributes:
-        levels: int32 [9, h, w] of levels 1, 2, ..; channel 3 * colour + band.
-        lowest: int32 [3, h, w].
+        levels: int32 [9, h, w] latents of level 1, 2, and so on; channel is 3 * colour + band.
+        lowest: int32 [3, h, w] lowest planes.
     """
 
     levels: tuple[Ints, ...]
@@ -37,12 +37,15 @@ class Latents(NamedTuple):
 def encode(
     fields: Mapping[str, Any], cells: NDArray[np.bool_], latents: Latents
 ) -> tuple[bytes, bytes]:
-    """The stream of latents, and the escapes beside it: `data` and `escapes` of PLAN.
+    """Encodes latents.
 
     Args:
-        fields: The other fields of PLAN.
-        cells: Cells that have latents [rows, columns].
-        latents: What to put.
+        fields: Values of PLAN except for the two returned.
+        cells: bool [rows, columns] cells that have latents.
+        latents: The latents.
+
+    Returns:
+        `data` and `escapes` of PLAN: the entropy-coded stream, and the values that have no symbol.
     """
     coder = Encoder()
     for _ in steps(coder, fields, cells, latents):
@@ -51,15 +54,16 @@ def encode(
 
 
 def decode(fields: Mapping[str, Any], cells: NDArray[np.bool_], where: str) -> Latents:
-    """The latents of a stream.
+    """Decodes latents.
 
     Args:
-        fields: Those of PLAN.
-        cells: Cells that have latents [rows, columns].
-        where: The chunk, for errors.
+        fields: Values of PLAN.
+        cells: bool [rows, columns] cells that have latents.
+        where: Name of the chunk in error messages.
 
     Raises:
         FormatError: The stream is corrupt.
+        UnsupportedError: The model is unknown.
     """
     coder = Decoder(fields["data"], fields["escapes"])
     lowest, *found = steps(coder, fields, cells, None)
@@ -71,13 +75,20 @@ def steps(
     coder: Encoder | Decoder, fields: Mapping[str, Any], cells: NDArray[np.bool_],
     values: Latents | None,
 ) -> Iterator[Ints]:  # fmt: skip
-    """Codes and gives the lowest planes, then each level, coarsest first.
+    """Codes the lowest planes, then each level, the coarsest first.
 
     Args:
-        coder: Puts `values`, or finds them.
-        fields: Those of PLAN.
-        cells: Cells that have latents [rows, columns].
-        values: What to put; None for a decoder.
+        coder: The encoder or decoder.
+        fields: Values of PLAN.
+        cells: bool [rows, columns] cells that have latents.
+        values: Latents to encode; None for a decoder.
+
+    Yields:
+        The lowest planes, int32 [3, h, w], then the latents of each level, int32 [9, h, w].
+
+    Raises:
+        FormatError: The stream is corrupt.
+        UnsupportedError: The model is unknown.
     """
     weights = registered_model.registered(fields["model"])
     levels, step, size = fields["levels"], fields["step"], fields["size"]
@@ -108,7 +119,7 @@ def steps(
 def _code_lowest(
     coder: context.Coder, fields: Mapping[str, Any], shape: tuple[int, int], values: Latents | None
 ) -> Ints:
-    """Codes the lowest planes by x + y ascending, each predicted from above and left."""
+    """Codes the lowest planes by ascending x + y, each value predicted from above and left."""
     h, w = shape
     scale = np.array(fields["lowest"], np.int64)
     count = len(scale)
@@ -131,7 +142,18 @@ def _code_lowest(
 def support_at(
     cells: NDArray[np.bool_], cell: int, size: tuple[int, int], level: int, levels: int
 ) -> NDArray[np.bool_]:
-    """Positions of a level that have latents: those over a sample of a stored cell."""
+    """Positions of a level that have latents: those over at least one sample of a stored cell.
+
+    Args:
+        cells: bool [rows, columns] cells that have latents.
+        cell: Binary logarithm of the side of a cell in samples.
+        size: Width and height of the raster in samples.
+        level: Number of the level, from 1, the finest.
+        levels: Number of levels.
+
+    Returns:
+        bool [h, w] with the shape of the level.
+    """
     columns, rows = (-(-n >> levels) << levels for n in size)
     out = np.zeros((rows >> level, columns >> level), bool)
     if level < cell:
@@ -146,7 +168,7 @@ def support_at(
 
 
 class Encoder:
-    """Puts latents into a stream."""
+    """Writes latents to a stream."""
 
     def __init__(self) -> None:
         self.stream = rans.Encoder()
@@ -155,7 +177,16 @@ class Encoder:
     def code(
         self, values: NDArray[np.int64], mean: NDArray[np.int64], scale: NDArray[np.int64]
     ) -> NDArray[np.int64]:
-        """Puts a set of latents [N] with means in 1/16 and scale indices; those that are coded."""
+        """Writes a set of latents.
+
+        Args:
+            values: int64 [N] latents.
+            mean: int64 [N] predicted means in 1/16.
+            scale: int64 [N] scale indices.
+
+        Returns:
+            int64 [N] latents as a decoder reads them: 0 where a latent is certain and is not coded.
+        """
         at = laplace.locate(mean, scale)
         there = at.row >= 0
         row, centre, shift = (v[there] for v in at)
@@ -177,14 +208,14 @@ class Encoder:
         return np.where(there, values, 0)
 
     def level(self, at: context_native.Place, values: Ints | None) -> Ints:
-        """Puts a whole level, in the compiled kernel."""
+        """Writes a whole level with the compiled kernel; returns its latents as decoded."""
         assert values is not None, "an encoder is given what to put"
         latents, escapes = context_native.encode(at, values, self.stream)
         self._escapes.append(escapes)
         return latents
 
     def escapes(self) -> bytes:
-        """The differences that have no symbol: zigzag, 7 bits a byte, low first."""
+        """Differences that have no symbol, zigzag-coded, 7 bits a byte, the low bits first."""
         out = bytearray()
         for value in np.concatenate(self._escapes).tolist() if self._escapes else ():
             n = 2 * value if value >= 0 else -2 * value - 1
@@ -196,7 +227,15 @@ class Encoder:
 
 
 class Decoder:
-    """Takes latents from a stream."""
+    """Reads latents from a stream.
+
+    Args:
+        data: The entropy-coded stream, `data` of PLAN.
+        escapes: The values that have no symbol, `escapes` of PLAN.
+
+    Raises:
+        FormatError: The stream is truncated or corrupt.
+    """
 
     def __init__(self, data: bytes, escapes: bytes) -> None:
         self._stream = rans.Decoder(data)
@@ -205,7 +244,15 @@ class Decoder:
     def code(
         self, values: NDArray[np.int64], mean: NDArray[np.int64], scale: NDArray[np.int64]
     ) -> NDArray[np.int64]:
-        """Takes a set of latents [N] with means in 1/16 and scale indices; `values` are ignored.
+        """Reads a set of latents.
+
+        Args:
+            values: Ignored; it is there because an encoder has it.
+            mean: int64 [N] predicted means in 1/16.
+            scale: int64 [N] scale indices.
+
+        Returns:
+            int64 [N] latents.
 
         Raises:
             FormatError: The stream is corrupt.
@@ -234,11 +281,16 @@ class Decoder:
         return out
 
     def level(self, at: context_native.Place, values: Ints | None) -> Ints:
-        """Takes a whole level, in the compiled kernel."""
+        """Reads a whole level with the compiled kernel; `values` is ignored.
+
+        Raises:
+            FormatError: The stream is corrupt.
+        """
         latents, self._at = context_native.decode(at, self._stream, self._escapes, self._at)
         return latents
 
     def _escape(self) -> int:
+        """Reads a value that has no symbol."""
         n = shift = 0
         while True:
             if self._at >= len(self._escapes) or shift > 21:
@@ -251,7 +303,7 @@ class Decoder:
                 return -(n + 1) // 2 if n & 1 else n // 2
 
     def finish(self, where: str) -> None:
-        """Checks that everything was used.
+        """Checks that the stream and the escapes are used up.
 
         Raises:
             FormatError: Something is left over.

@@ -1,4 +1,4 @@
-"""Planes of the pyramid coder: latents <-> PLAN, and the raster that they give."""
+"""Planes of the pyramid coder: latents <-> PLAN, and the raster that they decode to."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ class Planes:
     """Coded latents of one raster.
 
     Attributes:
-        packed: The fields of PLAN.
-        where: The chunk, for errors.
+        packed: Values of PLAN.
+        where: Name of the chunk in error messages.
     """
 
     packed: Mapping[str, Any]
@@ -32,18 +32,18 @@ class Planes:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Columns and rows of the raster."""
+        """Width and height of the raster in samples."""
         columns, rows = self.packed["size"]
         return columns, rows
 
     @property
     def components(self) -> int:
-        """1 grey, 3 colour."""
+        """Components of a sample: 1 for grey, 3 for colour."""
         return int(self.packed["components"])
 
     @cached_property
     def support(self) -> NDArray[np.bool_]:
-        """Cells that have latents [rows, columns].
+        """Cells that have latents, bool [rows, columns].
 
         Raises:
             FormatError: The stream is corrupt.
@@ -58,7 +58,7 @@ class Planes:
 
     @property
     def latents(self) -> Latents:
-        """The latents, decoded anew each time: the raster is what is kept.
+        """Latents; decoded again at each call, because only the raster is kept in memory.
 
         Raises:
             FormatError: The stream is corrupt.
@@ -67,11 +67,11 @@ class Planes:
 
     @cached_property
     def raster(self) -> Floats:
-        """The decoded raster [rows, columns, components], in 0..1.
+        """Decoded raster, float32 [rows, columns, components] in 0..1.
 
         Raises:
             FormatError: The stream is corrupt.
-            UnsupportedError: The model is not known.
+            UnsupportedError: The model is unknown.
         """
         found = self.latents
         weights = registered_model.registered(self.packed["model"])
@@ -85,11 +85,15 @@ class Planes:
 
 
 def unpack(fields: Mapping[str, Any], where: str = "chunk PLAN") -> Planes:
-    """Planes of PLAN; the streams are decoded when first needed.
+    """Creates planes from PLAN; the streams are decoded when they are first needed.
+
+    Args:
+        fields: Values of PLAN.
+        where: Name of the chunk in error messages.
 
     Raises:
         FormatError: The fields contradict each other.
-        UnsupportedError: The model is not known.
+        UnsupportedError: The model is unknown.
     """
     registered_model.registered(fields["model"])
     levels, components = fields["levels"], fields["components"]
@@ -107,20 +111,22 @@ def encoded(
     cell: int = 3, components: int = 3, number: int = 1,
     shifts: tuple[int, ...] | None = None,
 ) -> Planes:  # fmt: skip
-    """Planes that hold latents.
+    """Encodes latents as planes.
 
     Args:
-        latents: What to hold; outside the support they are taken as 0, except the lowest.
-        size: Columns and rows of the raster.
-        step: Quantization step, 2**(step / 64).
-        support: Cells that have latents; None = all.
-        cell: Side of a cell is 2**cell samples.
-        components: 1 or 3.
-        number: The model.
-        shifts: Shift of the scale index per level: luma, chroma.
+        latents: The latents. Those outside the support are taken as 0, except the lowest planes.
+        size: Width and height of the raster in samples.
+        step: Quantization step in 1/64 octave: it is 2**(step / 64) levels of 8 bits.
+        support: bool [rows, columns] cells that have latents; None for all.
+        cell: Binary logarithm of the side of a cell in samples.
+        components: 1 for grey, 3 for colour.
+        number: Number of the registered model.
+        shifts: Shifts of the scale index: luma and chroma of level 1, then of level 2, and so on;
+            by default 0.
 
     Raises:
-        ValueError: A latent is as large as `context.LIMIT`, or larger.
+        ValueError: The magnitude of a latent is `context.LIMIT` or more.
+        UnsupportedError: The model is unknown.
     """
     if any(np.abs(y).max() >= context.LIMIT for y in (*latents.levels, latents.lowest)):
         raise ValueError(context.BAD_LATENT)
@@ -151,17 +157,18 @@ def encoded(
 
 
 def salvaged(planes: Planes) -> tuple[Planes, int]:
-    """Planes with the levels that can be decoded of a stream that is cut off or damaged.
+    """Keeps the levels that can be decoded from a stream that is cut off or damaged.
 
-    A level is in vain if the stream fails in it. If it only does not end where it should, the
-    finest one is: wherever the damage is, what comes last is wrong.
+    A level in which the stream fails is dropped, with all finer ones. If the stream can be decoded
+    but does not end where it should, the finest level is dropped: wherever the damage is, the last
+    symbols are wrong.
 
     Args:
-        planes: As they were read; `data` may be shorter than it says.
+        planes: Planes as they were read; `data` may be shorter than its header says.
 
     Returns:
-        Planes with a sound stream, and how many levels they have from it; finer ones are 0. The
-        same planes if nothing is wrong.
+        Planes with a sound stream, and the number of levels that were kept; the latents of finer
+        levels are 0. If nothing is wrong, the same planes and the number of all levels.
 
     Raises:
         FormatError: Not even the lowest planes can be decoded.
@@ -195,7 +202,7 @@ def salvaged(planes: Planes) -> tuple[Planes, int]:
 
 
 def _cut(data: bytes) -> bytes:
-    """A stream that does not promise more words than there are."""
+    """Lowers the number of words in the header of a stream to the number that is there."""
     head = 5 + (4 << data[0] if data else 0)
     there = max(len(data) - head, 0) // 2
     words = min(int.from_bytes(data[head - 4 : head], "little"), there)
@@ -203,14 +210,19 @@ def _cut(data: bytes) -> bytes:
 
 
 def cells_of(size: tuple[int, int], cell: int) -> tuple[int, int]:
-    """Rows and columns of cells of a raster."""
+    """Rows and columns of cells of a raster.
+
+    Args:
+        size: Width and height of the raster in samples.
+        cell: Binary logarithm of the side of a cell in samples.
+    """
     return -(-size[1] >> cell), -(-size[0] >> cell)
 
 
 def _scale_of(plane: Ints) -> int:
-    """Scale index for the differences of a lowest plane from their prediction.
+    """Scale index for the differences between a lowest plane and its prediction.
 
-    None is certain, unless all are 0.
+    It is never one that takes a latent as certain, unless the whole plane is 0.
     """
     error = np.abs(plane - (_predicted(plane) >> laplace.MEAN_BITS)).mean()
     least = laplace.CERTAIN + 1 if plane.any() else 0
@@ -218,7 +230,7 @@ def _scale_of(plane: Ints) -> int:
 
 
 def _predicted(plane: Ints) -> Ints:
-    """Mean of the samples above and to the left, in 1/16."""
+    """Prediction of a plane: mean of the values above and to the left, in 1/16."""
     up = np.concatenate([plane[:1] * 0, plane[:-1]])
     left = np.concatenate([plane[:, :1] * 0, plane[:, :-1]], 1)
     mean: Ints = 8 * (up + left)

@@ -1,1 +1,1 @@
-"""Whether a file is valid, and what is odd about it."""
+"""Validation: checks whether a file is valid, and warns of oddities."""

@@ -1,4 +1,4 @@
-"""What is found wrong with a file, and how the place of it is called."""
+"""Collection of the issues of a file, with the names and offsets of its chunks."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..errors import FormatError, LimitError, PxiError, UnsupportedError
 from .warnings import ERROR, Issue
 
 REFUSED = (FormatError, UnsupportedError, LimitError)
-"""What is raised where a file is refused."""
+"""Errors that are raised if a file is refused."""
 
 NO_MEMORY = LimitError("there is not enough memory for it")
 
@@ -18,12 +18,12 @@ _NUMBERED = (layr.TYPE, mesh.TYPE, pose.TYPE, netw.TYPE, plan.TYPE, texr.TYPE)
 
 
 class Findings:
-    """Issues of one file, gathered.
+    """Issues of one file, as they are found.
 
     Attributes:
-        issues: What was found, in that order.
-        state: Which state of the history is looked at; empty for the file itself.
-        offsets: Where the chunks are, by type and number; None if that is not known.
+        issues: The issues, in the order in which they were found.
+        state: Name of the state of the history that is being checked; empty for the file itself.
+        offsets: Offset in bytes of each chunk, by type and number; None if it is not known.
     """
 
     def __init__(self) -> None:
@@ -37,12 +37,23 @@ class Findings:
         return any(issue.severity == ERROR for issue in self.issues)
 
     def place(self, type_: str, number: int) -> tuple[str, int | None]:
-        """How a chunk is called, and where it is."""
+        """Name of a chunk in issues, and its offset in bytes or None.
+
+        Args:
+            type_: Type of the chunk.
+            number: Its number among the chunks of that type.
+        """
         name = f"{type_} {number}" if type_ in _NUMBERED else type_
         return name, self.offsets.get((type_, number))
 
     def report(self, error: PxiError, type_: str = "", number: int = 0) -> None:
-        """Adds an error of a chunk, or of what the error itself names."""
+        """Adds an error.
+
+        Args:
+            error: The error.
+            type_: Type of the chunk that it is about; by default the chunk that the error names.
+            number: Number of the chunk among those of its type.
+        """
         code, message = error.rule, getattr(error, "problem", str(error))
         if type_:
             name, offset = self.place(type_, number)
@@ -57,7 +68,16 @@ class Findings:
         self.issues.append(Issue(code, ERROR, message, name, offset, error.exit_code))
 
     def attempt(self, work: Callable[[], Any], type_: str = "", number: int = 0) -> Any:
-        """What `work` gives; None if it fails, which is reported."""
+        """Calls `work`, and reports its error.
+
+        Args:
+            work: The function to call.
+            type_: Type of the chunk that it is about; by default the chunk that the error names.
+            number: Number of the chunk among those of its type.
+
+        Returns:
+            The result of `work`; None if it fails.
+        """
         try:
             return work()
         except REFUSED as error:

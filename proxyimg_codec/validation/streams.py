@@ -1,4 +1,4 @@
-"""Decodes all streams of a container; states of a history share most of them."""
+"""Decoding of all streams of a container, each once; states of a history share most of them."""
 
 from __future__ import annotations
 
@@ -20,20 +20,21 @@ from .findings import Findings
 
 
 class Streams:
-    """What chunks of a file and its history decode to, each once.
+    """Decoded chunks of a file and its history; equal chunks are decoded once.
 
     Attributes:
-        budget: Values that may still be decoded; what would exceed it is passed over.
+        budget: Number of values that may still be decoded; streams that would exceed it are
+            skipped.
     """
 
     def __init__(self, findings: Findings, limits: Limits) -> None:
         self.budget: float = inf
         self._findings, self._limits = findings, limits
-        # By the identity of what the chunk holds, and of what it needs.
+        # Keys are the identities of the values of a chunk, and of the objects that it refers to.
         self._results: dict[tuple[int, ...], Any] = {}
 
     def decode(self, c: Container) -> None:
-        """Decodes all streams of a container; what is wrong is reported."""
+        """Decodes all streams of a container, and reports their errors."""
         budget = Budget(self._limits)
         for i, v in enumerate(c.layers):
             self._once(layr.TYPE, i, sum(v["segments"]), partial(boundary.decode, v, ""), v)
@@ -70,6 +71,13 @@ class Streams:
                 self._once(motn.TYPE, 0, cost, work, c.motion, *moving)
 
     def _textures(self, c: Container, nets: list[Any], rasters: list[Any]) -> None:
+        """Decodes the textures of a container.
+
+        Args:
+            c: The container.
+            nets: Its networks; None for those that could not be decoded.
+            rasters: Its planes, likewise.
+        """
         for i, v in enumerate(c.textures):
             if v["coder"] == texr.IMPLICIT:
                 sampling = c.layers[i]["sampling"]
@@ -88,7 +96,7 @@ class Streams:
                 self._once(texr.TYPE, i, cost, work, *parts)
 
     def keep(self, c: Container, picture: Picture) -> None:
-        """Takes over what the chunks of a picture were decoded to."""
+        """Takes over the objects that the chunks of a picture were decoded to."""
         meshes = [picture.layers[v["layer"]].mesh for v in c.meshes]
         pairs = [
             *zip(c.layers, [v.boundary for v in picture.layers], strict=True),
@@ -108,9 +116,18 @@ class Streams:
     def _once(
         self, type_: str, number: int, cost: int, work: Callable[[], Any], *parts: object
     ) -> Any:
-        """What a chunk decodes to, once for the same `parts`; None if that fails.
+        """Decodes a chunk, unless that was done for the same `parts` before.
 
-        The history may hold as many chunks as it likes: `cost` is what their streams hold.
+        Args:
+            type_: Type of the chunk.
+            number: Its number among the chunks of that type.
+            cost: Number of values in its streams. A history may hold any number of chunks,
+                therefore their sum is bounded by `budget`.
+            work: Function that decodes the chunk.
+            *parts: The values of the chunk, and the objects that it refers to.
+
+        Returns:
+            The result of `work`; None if it fails or the budget is spent.
         """
         key = tuple(map(id, parts))
         if key not in self._results:
@@ -122,17 +139,23 @@ class Streams:
 
 
 def _mesh(values: Values, budget: Budget) -> Mesh:
+    """Decodes a mesh and refines it."""
     own = Mesh({k: v for k, v in values.items() if k != "layer"}, "", budget)
     _ = own.refined
     return own
 
 
 def _planes(values: Values) -> planes.Planes:
+    """Decodes planes, including their latents, which are not kept."""
     own = planes.unpack(values, "")
     latents(own)
     return own
 
 
 def latents(own: planes.Planes) -> None:
-    """Decodes the latents of planes, which are not kept."""
+    """Decodes the latents of planes, and drops them.
+
+    Raises:
+        FormatError: A stream is corrupt.
+    """
     _ = own.latents

@@ -1,7 +1,8 @@
-"""Checks a file completely: every chunk, every stream, and what is odd without being wrong.
+"""Complete check of a file: every chunk, every stream, and oddities that are not errors.
 
-Errors have the id of the broken statement of the specification; what is odd has codes of its own
-(`warnings`). An error stops the check of its chunk, and of what cannot be understood without it.
+Errors have the id of the broken statement of the specification; oddities have codes of their own
+(`warnings`). An error ends the check of its chunk, and of everything that cannot be understood
+without it.
 """
 
 from __future__ import annotations
@@ -29,20 +30,20 @@ from .streams import Streams, latents
 from .warnings import ERROR, Issue
 
 HISTORY_CHUNKS, HISTORY_VALUES = 1 << 20, 1 << 26
-"""Chunks of all states of a history, and values in their streams, that are checked at most."""
+"""Most chunks of all states of a history, and most values in their streams, that are checked."""
 
 DRAWN = 256
-"""Samples a side at which it is tried how often a bent layer covers itself."""
+"""Samples in the longer side of the trial drawing that finds how often a bent layer overlaps."""
 
 _END = Chunk("TAIL", b"")
 
 
 class Report(NamedTuple):
-    """What is known of a file.
+    """Result of the check of a file.
 
     Attributes:
-        issues: What is wrong, and what is odd: errors, then warnings, then notes, each by their
-            place in the file. It is valid if nothing of that is an error.
+        issues: Errors, then warnings, then notes, each by their offset in the file. The file is
+            valid if there are no errors.
         profile: One of `levels.PROFILES`; None if the file is not valid.
         level: 1..3; None if the file is not valid, or above all levels.
     """
@@ -53,16 +54,16 @@ class Report(NamedTuple):
 
 
 def validate(data: bytes, limits: Limits = DEFAULT_LIMITS) -> list[Issue]:
-    """What is wrong with a file, and what is odd: `Report.issues` of `report`."""
+    """Checks a file; returns the issues of `report`."""
     return report(data, limits).issues
 
 
 def report(data: bytes, limits: Limits = DEFAULT_LIMITS) -> Report:
-    """Checks a file.
+    """Checks a file completely.
 
     Args:
         data: The file.
-        limits: What exceeds them is an error.
+        limits: Limits; a file that exceeds them has an error.
     """
     check = _Check(limits)
     check.file(data)
@@ -75,12 +76,12 @@ def report(data: bytes, limits: Limits = DEFAULT_LIMITS) -> Report:
 
 
 class _Check:
-    """The check of one file.
+    """Check of one file.
 
     Attributes:
-        findings: What was found.
-        profile: That of the file, if its chunks fit together.
-        usage: What was spent on the file, without its history.
+        findings: The issues that were found.
+        profile: Profile of the file, if its chunks fit together.
+        usage: Budget that the file has spent, without its history.
     """
 
     def __init__(self, limits: Limits) -> None:
@@ -89,11 +90,11 @@ class _Check:
         self.usage = Usage(limits)
         self._limits, self._intact = limits, True
         self._streams = Streams(self.findings, limits)
-        # What chunks of the file and its history hold.
+        # Values of the chunks of the file and its history, so that equal chunks are parsed once.
         self._values: dict[tuple[str, bytes], Values] = {}
 
     def file(self, data: bytes) -> None:
-        """Checks all of it."""
+        """Checks the whole file."""
         chunks, wrong = self._chunks(data)
         complete = bool(chunks) and chunks[-1].type == _END.type
         numbers: Counter[str] = Counter()
@@ -121,7 +122,7 @@ class _Check:
             self._history(content.history)
 
     def _chunks(self, data: bytes) -> tuple[list[Chunk], dict[int, FormatError]]:
-        """All chunks that can be told, and what is wrong with the frames of some."""
+        """Chunks that can be recognized, and errors in their framing by position in the list."""
         try:
             return read(data, self.usage), {}
         except REFUSED as error:
@@ -140,13 +141,18 @@ class _Check:
         return chunks, wrong
 
     def _values_of(self, chunk: Chunk) -> Values:
+        """Values of the fields of a chunk, parsed once."""
         key = chunk.type, chunk.payload
         if key not in self._values:
             self._values[key] = file.values(chunk)
         return self._values[key]
 
     def _payload(self, chunk: Chunk, chunks: Sequence[Chunk]) -> bool:
-        """Checks a chunk by itself; always True."""
+        """Checks a chunk by itself; always returns True.
+
+        Raises:
+            FormatError, UnsupportedError, LimitError: The chunk is refused.
+        """
         if file.fields_of(chunk):
             self._values_of(chunk)
         if chunk.type in meta.BLOCKS.values():
@@ -162,11 +168,11 @@ class _Check:
         return True
 
     def _picture(self, c: Container) -> None:
-        """Decodes all of the picture, and tries what it takes to show it, and what is odd."""
+        """Decodes the whole picture; checks the cost of drawing it, and looks for oddities."""
         try:
             picture = refined(c, self.usage)
         except (*REFUSED, MemoryError) as error:
-            self._streams.decode(c)  # finds all that is wrong, not only what was met first
+            self._streams.decode(c)  # finds all errors, not only the first
             if not self.findings.failed:
                 self.findings.report(error if isinstance(error, PxiError) else NO_MEMORY)
             return
@@ -184,7 +190,7 @@ class _Check:
             self.findings.issues += warnings.find(picture, c, self.findings.place)
 
     def _drawing(self, picture: Picture, layer: Layer) -> None:
-        """Tries what bent layers cost, at a small size."""
+        """Checks the cost of drawing a bent layer, at a small size."""
         _ = present_outline(picture, layer)
         bent = warp.Warp(layer.pose, layer.mesh, layer.sampling in (1, 2), Budget(self._limits))
         if bent.meshed:
@@ -198,7 +204,7 @@ class _Check:
             bent.faces(np.zeros(2), np.full(2, scale), box)
 
     def _history(self, history: Sequence[undo.Step]) -> None:
-        """Checks the states of a history, the latest first, up to one that is wrong."""
+        """Checks the states of a history, the latest first, until one has an issue."""
         issues = self.findings.issues
         self._streams.budget, chunks, found = HISTORY_VALUES, 0, len(issues)
         for number, step in reversed([*enumerate(history, 1)]):
@@ -214,7 +220,7 @@ class _Check:
                 return
 
     def _state(self, step: undo.Step) -> None:
-        """Checks a state of the history."""
+        """Checks one state of the history."""
         if any(c.type == undo.TYPE for c in step.chunks):
             self.findings.report(FormatError("it has a history itself", rule="MET-16"))
         chunks, budget = [*step.chunks, _END], Budget(self._limits)

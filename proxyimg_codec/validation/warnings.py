@@ -1,4 +1,4 @@
-"""What is odd in a file without being wrong: the warnings and notes of `validate`."""
+"""Warnings and notes of `validate`: oddities in a file that are not errors."""
 
 from __future__ import annotations
 
@@ -33,23 +33,23 @@ CODES = {
     "VAL-11": "a history that was not checked as a whole, because it is too long",
     "VAL-12": "a version of the format before the present one",
 }
-"""Codes of what is odd. The last is a note, all others are warnings."""
+"""Codes of oddities and their meanings. The last is a note, all others are warnings."""
 
 _NOTES = ("VAL-12",)
 
 
 @dataclass(frozen=True)
 class Issue:
-    """Something that is wrong with a file, or odd.
+    """Error, warning or note about a file.
 
     Attributes:
-        code: Id of the broken statement of the specification, or one of `CODES`; "" if the file
+        code: Id of the broken statement of the specification, or one of `CODES`; empty if the file
             cannot be read.
         severity: ``error``, ``warning`` or ``note``.
-        message: What is wrong.
-        chunk: Type of the chunk, and its number where there may be several; "" = the file.
-        offset: Where in the file it begins, in bytes, or None.
-        exit_code: Of an error its class, as of `PxiError`; otherwise 0.
+        message: Description of the issue.
+        chunk: Type of the chunk, and its number if there may be several; empty for the file itself.
+        offset: Offset in the file, in bytes, or None.
+        exit_code: For an error the exit code of its `PxiError` class; otherwise 0.
     """
 
     code: str
@@ -61,22 +61,29 @@ class Issue:
 
 
 Place = Callable[[str, int], tuple[str, int | None]]
-"""Name and offset of the chunk with a number among those of its type."""
+"""Function from the type of a chunk, and its number in that type, to its name and offset."""
 
 
 def warning(code: str, detail: str, chunk: str = "", offset: int | None = None) -> Issue:
-    """A warning or note."""
+    """Creates a warning or note.
+
+    Args:
+        code: One of `CODES`.
+        detail: What the issue is about, added to the meaning of the code.
+        chunk: Name of the chunk; empty for the file itself.
+        offset: Offset in the file, in bytes, or None.
+    """
     severity = NOTE if code in _NOTES else WARNING
     return Issue(code, severity, f"{CODES[code]}: {detail}", chunk, offset)
 
 
 def find(picture: Picture, c: Container, place: Place) -> Iterator[Issue]:
-    """What is odd in a valid file.
+    """Finds the oddities of a valid file.
 
     Args:
         picture: The picture.
         c: Its container.
-        place: Tells where a chunk is.
+        place: Function that gives name and offset of a chunk.
     """
     for chunk in picture.extra:
         yield warning("VAL-1", f"it has {chunk.size} bytes", chunk.type, chunk.offset)
@@ -86,12 +93,13 @@ def find(picture: Picture, c: Container, place: Place) -> Iterator[Issue]:
 
 
 def old(version: tuple[int, int]) -> Iterator[Issue]:
-    """Whether the version of a file is not the present one."""
+    """Yields a note if the version of a file, major and minor, is not the present one."""
     if version != VERSION:
         yield warning("VAL-12", ".".join(map(str, version)), offset=8)
 
 
 def _metadata(picture: Picture, c: Container, place: Place) -> Iterator[Issue]:
+    """Finds oddities in metadata blocks, settings and the motion script."""
     for name, code, fits in (
         ("icc", "VAL-3", _is_icc), ("exif", "VAL-4", _is_exif), ("xmp", "VAL-5", _is_xml),
     ):  # fmt: skip
@@ -106,7 +114,7 @@ def _metadata(picture: Picture, c: Container, place: Place) -> Iterator[Issue]:
 
 
 def _is_icc(block: bytes) -> bool:
-    """Whether the header of a profile is sound (ICC.1:2022, section 7.2), and it is one of RGB."""
+    """Whether a block is an ICC profile for RGB with a sound header (ICC.1:2022, section 7.2)."""
     sized = len(block) >= 128 and int.from_bytes(block[:4]) == len(block)
     return sized and block[36:40] == b"acsp" and block[16:20] == b"RGB "
 
@@ -133,6 +141,7 @@ def _is_object(text: str) -> bool:
 def _layer(
     number: int, layer: Layer, outline: Boundary | None, c: Container, place: Place
 ) -> Iterator[Issue]:
+    """Finds oddities of one layer."""
     home, what = place(layr.TYPE, number), f"{layer.name!r}"
     posed = [v["layer"] for v in c.poses]
     at_pose = place(pose.TYPE, posed.index(number)) if number in posed else home

@@ -1,1 +1,1 @@
-"""Files that must be refused; the cases of a module lie in ``cases/refused-MODULE``."""
+"""Files that must be refused; the cases of a module are in ``cases/refused-MODULE``."""

@@ -1,4 +1,4 @@
-"""Files that must be refused: faults of coded arrays, of boundaries and of lists of numbers."""
+"""Refused files: faults of coded arrays, of boundaries and of lists of numbers."""
 
 from __future__ import annotations
 
@@ -29,25 +29,27 @@ from .base import (
 )
 
 QUIET = b"\x01\x7e"
-"""A float16 that is no number, with a bit more; its sign and lower bits do not matter."""
+"""A float16 that is NaN, with another bit set; its sign and lower bits do not matter."""
 
 
 def _mask(b: Base, value: int) -> bytes:
+    """Coded mask of stored codes that is `value` everywhere."""
     values = np.full((1, GRID[1], GRID[0]), value)
     return arrays.encode(values, 1, np.ones(values.shape[1:], bool))
 
 
 def _half(value: float) -> bytes:
+    """Bytes of a float16."""
     return struct.pack("<e", value)
 
 
 def _halves(at: int, key: str, first: bytes) -> Callable[[Base], bytes]:
-    """Other first halves in a field."""
+    """Builder of a file with other first float16 values in a field."""
     return lambda b: b.edit(at, key, lambda v: first + v[len(first) :])
 
 
 def _inner(change: Callable[[int], int]) -> Callable[[Base], bytes]:
-    """Weights whose first length is another."""
+    """Builder of a file with the first length in the weights changed."""
 
     def edit(weights: bytes) -> bytes:
         return change(int.from_bytes(weights[:4], "little")).to_bytes(4, "little") + weights[4:]
@@ -56,17 +58,17 @@ def _inner(change: Callable[[int], int]) -> Callable[[Base], bytes]:
 
 
 def _swallow(weights: bytes) -> bytes:
-    """The first array of weights takes in the second."""
+    """Weights whose first array takes in the second."""
     return (len(weights) - 4).to_bytes(4, "little") + weights[4:]
 
 
 def _shape(*points: tuple[int, int], unit: int = 0) -> dict[str, Any]:
-    """Fields of a boundary of one path, whose three points a segment are given."""
+    """Fields of a boundary of one path, given by three points a segment."""
     return boundary.encode(Boundary(unit, (np.array(points, np.int64),)))
 
 
 def _wide_class(b: Base) -> bytes:
-    """Deltas of which one has class 15, and the magnitude 5."""
+    """Deltas of which one has class 15, but the magnitude 5."""
     classes = np.zeros((6, 1, 1), np.int64)
     classes[0] = 15
     coded = arrays.encode(classes, 4, np.ones((1, 1), bool))

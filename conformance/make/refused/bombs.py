@@ -1,4 +1,4 @@
-"""Files that must be refused: a few bytes that ask for as much as can be asked for."""
+"""Refused files: a few bytes that ask for as much as possible."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from .pyramids import PLAN, Views
 
 
 def stream(words: int = 0) -> bytes:
-    """A coded array that goes on for as long as it may: symbols soon cost next to nothing."""
+    """Coded array that is as long as is allowed; its symbols soon cost next to nothing."""
     return b"\0" + (1 << 16).to_bytes(4, "little") + words.to_bytes(4, "little") + bytes(2 * words)
 
 
 class Fine(Base):
-    """A valid file: a layer that is bent by a mesh of many faces, most of them beside it."""
+    """Valid file: a layer that is bent by a mesh of many faces, most of them beside it."""
 
     def build(self, n: Numbers) -> Picture:
-        """The picture."""
+        """Makes the picture of the file."""
         split = [range(count) for count in (1054, 4216)]
         mesh = grid_mesh((0, 0), 31, 17, step=(64, 64), cell=8, split=split)
         nodes = np.zeros_like(mesh.refined.nodes)
@@ -40,12 +40,12 @@ class Fine(Base):
 
 
 class FarPoints(Base):
-    """A valid file: a hidden, bent layer whose boundary lies beside its mesh of many faces."""
+    """Valid file: a hidden, bent layer whose boundary lies beside its mesh of many faces."""
 
     POSE = 4
 
     def build(self, n: Numbers) -> Picture:
-        """The picture."""
+        """Makes the picture of the file."""
         split = [range(count) for count in (1054, 4216, 16_864)]
         mesh = grid_mesh((8, 0), 31, 17, step=(32, 32), cell=8, split=split)
         nodes = np.zeros_like(mesh.refined.nodes)
@@ -58,35 +58,35 @@ class FarPoints(Base):
 
 
 class Many(Base):
-    """A valid file: layers that share a texture."""
+    """Valid file: layers that share a texture."""
 
     count, dim, hidden, depth = 129, 1, 1, 1
 
     def build(self, n: Numbers) -> Picture:
-        """The picture."""
+        """Makes the picture of the file."""
         shown = texture(n, dim=self.dim, grid=(2, 2))
         layers = [layer(str(k), (0, 0, 1, 1), shown) for k in range(self.count)]
         net = network(n, dim=self.dim, hidden=self.hidden, depth=self.depth, octaves=0)
         return picture((8, 8), [*layers[:-1], self.front(layers[-1])], net)
 
     def front(self, last: Layer) -> Layer:
-        """The layer in front of the others."""
+        """Returns the layer in front of the others, made from `last`."""
         return last
 
 
 class ManyWeights(Many):
-    """With a network of 1,083 weights and biases."""
+    """Valid file: layers that share a texture, with a network of 1,083 weights and biases."""
 
     count, hidden, depth = 256, 30, 2
 
 
 class ManyFaces(Many):
-    """With a bent layer in front."""
+    """Valid file: layers that share a texture, and a bent layer in front."""
 
     count = 256
 
     def front(self, last: Layer) -> Layer:
-        """The layer on two faces."""
+        """Returns the layer bent by a mesh of two faces."""
         mesh = grid_mesh((0, 0), 1, 1, step=(1 << 19, 1 << 19))
         nodes = np.zeros_like(mesh.refined.nodes)
         nodes[0] = -16
@@ -94,20 +94,20 @@ class ManyFaces(Many):
 
 
 class ManyAnchors(Many):
-    """With a layer in front that has a global feature of four anchors."""
+    """Valid file: layers that share a texture; the front has a global feature of four anchors."""
 
     count, dim = 256, 4
 
     def front(self, last: Layer) -> Layer:
-        """The layer with that feature."""
+        """Returns the layer with the global feature."""
         return replace(last, sampling=3)
 
 
 class Lines(Base):
-    """A valid file: a layer whose boundary goes to and fro, thousands of pixels beyond the row."""
+    """Valid file: a layer whose boundary goes to and fro, thousands of pixels beyond the canvas."""
 
     def build(self, n: Numbers) -> Picture:
-        """The picture."""
+        """Makes the picture of the file."""
         there = np.arange(4)[:, None] * (87_380, 1)
         path = np.concatenate([there[:3], there[:0:-1]] * 2050)
         back = layer("back", (0, 0, 8, 1), texture(n))

@@ -1,4 +1,4 @@
-"""Files that must be refused: faults of the signature and of chunks' framing, and polyglots."""
+"""Refused files: faults of the signature and of the framing of chunks, and polyglots."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ PAGE = b"<html><script>alert(1)</script>"
 
 
 def _joined(b: Base) -> bytes:
-    """LAYR takes in the chunk behind it, framing and all, with the right CRC."""
+    """File whose LAYR takes in the chunk after it, including its framing, with a valid CRC."""
     chunks = list(b.chunks)
     after = write([chunks[DISC]])[12:]
     chunks[BACK] = replace(chunks[BACK], payload=chunks[BACK].payload + after)
@@ -36,7 +36,7 @@ def _joined(b: Base) -> bytes:
 
 
 def _short(b: Base) -> bytes:
-    """The length of LAYR ends within its payload: its CRC would be that of other bytes."""
+    """File in which the length of LAYR ends within its payload, so that the CRC is not valid."""
     return put(b.data, b.chunks[BACK].offset + 4, lambda v: v - 2)  # type: ignore[operator]  # it was read
 
 
@@ -45,7 +45,7 @@ def _private(type_: str) -> Callable[[Base], bytes]:
 
 
 def _ancillary(change: Callable[[bytes], bytes]) -> Callable[[Base], bytes]:
-    """The framing of an unknown ancillary chunk changed."""
+    """Builder of a file with changed bytes of an unknown ancillary chunk."""
 
     def build(b: Base) -> bytes:
         chunk = write([Chunk("teSt", b"abc")])[12:]

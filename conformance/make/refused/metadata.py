@@ -1,4 +1,4 @@
-"""Files with broken metadata, which a decoder that passes over it may read [CON-9]."""
+"""Refused files with broken metadata, which a decoder that ignores metadata may read [CON-9]."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from .motion import Moving
 
 
 class Plain(Base):
-    """A valid file of two layers."""
+    """Valid file of two layers."""
 
     def build(self, n: Numbers) -> Any:
-        """The picture."""
+        """Makes the picture of the file."""
         box = 0, 0, 8, 12
         layers = [layer("back", box, texture(n)), layer("front", (2, 2, 3, 3), texture(n))]
         return picture((8, 12), layers, network(n))
@@ -31,12 +31,12 @@ CONTENT = b"II*\0\x08\0\0\0\0\0\0\0"
 
 
 def _block(zstd: bytes, size: int = len(CONTENT), kind: str = "exif") -> Callable[[Base], bytes]:
-    """The file with a metadata block."""
+    """Builder of a file with a metadata block."""
     return lambda b: with_chunks(b.data, metadata(kind, b"", zstd, size=size))
 
 
 def _array(type_: str, *values: Any) -> Callable[[Base], bytes]:
-    """The file with a chunk that holds an array, right or wrong."""
+    """Builder of a file with a chunk that holds an array, valid or not."""
     return lambda b: with_chunks(b.data, Chunk(type_, msgpack.packb(values)))
 
 
@@ -45,7 +45,7 @@ def _tree(groups: list[str], parents: list[int]) -> Callable[[Base], bytes]:
 
 
 def _history(content: Any, **new: Any) -> Callable[[Base], bytes]:
-    """The file with a history, which is packed if it is not bytes."""
+    """Builder of a file with a history; `content` is packed if it is not bytes."""
     packed = content if isinstance(content, bytes) else msgpack.packb(content)
     return lambda b: with_chunks(b.data, history(b.data, packed, **new))
 
@@ -55,7 +55,7 @@ def _steps(*references: int) -> Callable[[Base], bytes]:
 
 
 def _together(b: Base) -> bytes:
-    """Two blocks that only together exceed the limit."""
+    """File with two blocks that exceed the limit only together."""
     half = 1 << 25
     blocks = ((kind, half + (kind == "xmp")) for kind in ("icc", "xmp"))
     return with_chunks(b.data, *(
@@ -64,18 +64,18 @@ def _together(b: Base) -> bytes:
 
 
 def _with_script(b: Base) -> bytes:
-    """A block that is as large as may be, beside a script."""
+    """File with a script, and a block that is as large as is allowed."""
     return with_chunks(b.data, metadata("xmp", b"", frame((0, 1 << 26)), size=1 << 26))
 
 
 def _with_history(b: Base) -> bytes:
-    """A block that is as large as may be, and a history."""
+    """File with a block that is as large as is allowed, and a history."""
     data = _with_script(b)
     return with_chunks(data, history(data, msgpack.packb([[], []])))
 
 
 def _early(b: Base) -> bytes:
-    """Information before the textures."""
+    """File with iNFO before the textures."""
     return write([*b.chunks[:-2], info(), *b.chunks[-2:]])
 
 
@@ -84,7 +84,7 @@ def _twice(b: Base) -> bytes:
 
 
 def _many_references(b: Base) -> bytes:
-    """A history of two steps of 2^20 chunks each, or nearly."""
+    """File with a history of two steps of almost 2^20 chunks each."""
     count = (1 << 20) - 1
     step = b"\x92\xa0\xdd" + count.to_bytes(4, "big")
     parts = (b"\x92\x90\x92" + step, (0, count), step, (0, count))
@@ -93,16 +93,16 @@ def _many_references(b: Base) -> bytes:
 
 
 def _window(b: Base) -> bytes:
-    """A frame that needs a window of 2^31 bytes."""
+    """File with a frame that needs a window of 2^31 bytes."""
     zstd = frame(CONTENT, window=(31 - 10) << 3)
     return with_chunks(b.data, metadata("exif", CONTENT, zstd))
 
 
 GOOD = frame(CONTENT)
 LAST = MAGIC + bytes([0x20, len(CONTENT)])
-"""Head of a frame, before its blocks."""
+"""Header of a frame, before its blocks."""
 SKIPPED = b"\x50\x2a\x4d\x18\x01\0\0\0a"
-"""A frame to be skipped."""
+"""A skippable frame."""
 
 
 # fmt: off

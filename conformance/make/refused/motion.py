@@ -1,4 +1,4 @@
-"""Files that must be refused: faults of motion."""
+"""Refused files: faults of motion."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ LINE = replace(LOOP, script='{"version": 1, "preset": "jelly"}\n')
 
 
 class Moving(Base):
-    """A valid file: a back with a mesh, a disc and a bar that move, and a layer without mesh."""
+    """Valid file: a back with a mesh, a disc and a bar that move, and a layer without mesh."""
 
     def build(self, n: Numbers) -> Picture:
-        """The picture."""
+        """Makes the picture of the file."""
         shown = texture(n, grid=(4, 4))
         split = grid_mesh((1, 1), 2, 2, step=(320, 288), split=[[0, 3]])
         image = picture(
@@ -55,7 +55,14 @@ class Moving(Base):
     def moves(
         self, numbers: Sequence[int], curve: int = 256, shape: int = 9, **new: Any
     ) -> dict[str, Any]:
-        """Values of mOTN for layers that have meshes; one coefficient and coordinate are given."""
+        """Values of mOTN for layers that have meshes.
+
+        Args:
+            numbers: Numbers of the layers.
+            curve: Value of one coefficient.
+            shape: Value of one coordinate of a shape.
+            **new: Other values of mOTN.
+        """
         tracks = []
         for number in numbers:
             mesh = Mesh({k: v for k, v in self.fields(BACK_MESH + number).items() if k != "layer"})
@@ -71,14 +78,14 @@ class Moving(Base):
 
 
 def _numbers(b: Moving, name: str, rows: int, columns: int, flat: bool = False) -> dict[str, bytes]:
-    """Streams of arrays of another size, all 1."""
+    """Streams of an array of another size, all of whose values are 1."""
     values = np.ones((rows, columns) if name == "curve" else (2, rows, columns), np.int64)
     classes, raw = deltas.encode(values.reshape(2, -1) if flat else values)
     return {f"{name}_classes": classes, f"{name}_deltas": raw}
 
 
 def _nodes(b: Moving) -> int:
-    """Nodes of the layers that move."""
+    """Number of nodes of the layers that move."""
     fields = (b.fields(k) for k in (DISC_MESH, BAR_MESH))
     return sum(
         len(Mesh({k: v for k, v in f.items() if k != "layer"}).refined.nodes) for f in fields
@@ -91,7 +98,7 @@ def _script(text: bytes, size: int | None = None) -> dict[str, Any]:
 
 
 def _late(b: Moving) -> bytes:
-    """The motion before the textures."""
+    """File with the motion before the textures."""
     return b.order(*range(NETW + 1), MOTION, *range(BACK_TEXR, MOTION), TAIL)
 
 

@@ -1,4 +1,4 @@
-"""More files that must be refused: faults of meshes, poses and shared textures."""
+"""Refused files: faults of meshes, poses and shared textures."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ from .base import Base, Row, put, refused
 
 
 class Posed(Base):
-    """A valid file: a back, a bent disc on a refined mesh, and a copy that shares its texture."""
+    """Valid file: a back, a bent disc on a refined mesh, and a copy that shares its texture."""
 
     dim, channels = 4, 3
 
     def build(self, n: Numbers) -> Picture:
-        """The picture."""
+        """Makes the picture of the file."""
         planes = [texture(n, dim=self.dim) for _ in range(2)]
         mesh = grid_mesh((1, 1), 2, 2, step=(320, 288), split=[[0, 3]])
         pose = Pose(nodes=bend(n, mesh, 20), opacity=60000)
@@ -60,7 +60,7 @@ class Posed(Base):
         )  # fmt: skip
 
     def sets(self, **values: dict[str, Any]) -> bytes:
-        """Several chunks with other fields, by the names of their positions."""
+        """File with changed values of several chunks, by the names of their positions."""
         chunks = list(self.chunks)
         for name, new in values.items():
             at = globals()[name]
@@ -70,7 +70,7 @@ class Posed(Base):
     def tiny(
         self, symbols: Sequence[int], points: Sequence[tuple[int, int]], far: Sequence[int] = ()
     ) -> bytes:
-        """The disc on another mesh, given by its symbols and by residuals of its vertices."""
+        """File in which the disc has another mesh, of given symbols and residuals of vertices."""
         stored = np.ones((1, len(symbols)), bool)
         classes, raw = deltas.encode(np.array(points, np.int64).T)
         mesh = {
@@ -82,19 +82,19 @@ class Posed(Base):
 
 
 class Odd(Posed):
-    """With an odd number of features."""
+    """Valid file with an odd number of features."""
 
     dim = 3
 
 
 class Clear(Posed):
-    """With alpha."""
+    """Valid file with alpha."""
 
     channels = 4
 
 
 def _moved(residuals: Sequence[tuple[int, int]], kind: str = "node") -> dict[str, bytes]:
-    """Fields of displacements."""
+    """Fields of displacements with these residuals."""
     classes, raw = deltas.encode(np.array(residuals, np.int64).T)
     return {f"{kind}_classes": classes, f"{kind}_deltas": raw}
 
@@ -103,16 +103,16 @@ NONE: dict[str, Any] = {"node_classes": b"", "node_deltas": b""}
 TRIANGLE = [(0, 0), (32, 0), (-32, 32)]
 """Residuals of three vertices."""
 ALONE = [1, 1, 1, 0, 0, 0]
-"""Symbols of one triangle."""
+"""Connectivity symbols of one triangle."""
 
 
 def _count(b: Posed) -> int:
-    """Nodes of the disc."""
+    """Number of nodes of the disc."""
     return len(Mesh(b.fields(DISC_MESH)).refined.nodes)
 
 
 def _flags(values: Sequence[int]) -> bytes:
-    """Split flags of one refinement."""
+    """Coded split flags of one refinement."""
     stored = np.ones((1, len(values)), bool)
     coded = arrays.encode(np.array(values)[None, None], 1, stored)
     return len(coded).to_bytes(4, "little") + coded
@@ -130,18 +130,18 @@ def _chain(b: Posed) -> bytes:
 
 
 MANY = grid_mesh((0, 0), 31, 17, step=(50, 75), cell=8)
-"""1,054 triangles."""
+"""Mesh of 1,054 triangles."""
 
 
 def _fine(b: Posed) -> bytes:
-    """The disc on a mesh whose fourth refinement works on 64 times as many triangles."""
+    """File in which the fourth refinement of a mesh works on 64 times as many triangles."""
     flags = b"".join(_flags([1] * (1054 << 2 * k)) for k in range(3))
     fields = {**MANY.fields, "levels": 4, "splits": flags + _flags([1])}
     return b.set(DISC_MESH, **fields)
 
 
 def _heaped(b: Posed) -> bytes:
-    """The disc on a mesh that is bent so much that the faces lie over each other."""
+    """File in which a mesh is bent so much that its faces lie over each other."""
     nodes = bend(Numbers("heaped"), MANY, 192)
     return b.sets(DISC_MESH=dict(MANY.fields), POSE=encode(Pose(nodes=nodes), MANY))
 

@@ -1,4 +1,4 @@
-"""Files that must be refused: faults of planes, of their streams, and of views."""
+"""Refused files: faults of planes, of their streams, and of views."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ CLEAR_TEXR = (5, 6)
 
 
 class Views(Base):
-    """A valid file: a back and a disc that show the same planes, which have a support."""
+    """Valid file: a back and a disc that show the same planes, which have a support."""
 
     def build(self, n: Numbers) -> Picture:
-        """The picture."""
+        """Makes the picture of the file."""
         cells = np.array([[1, 0, 1], [1, 1, 1], [0, 1, 1]], bool)
         source = coded(n, SIZE, cells=cells, large=(90, -300))
         mask = n.integers(0, 1, (6, 8)) > 0
@@ -44,10 +44,10 @@ class Views(Base):
 
 
 class Clear(Base):
-    """A valid file with alpha: two layers that show the same planes."""
+    """Valid file with alpha: two layers that show the same planes."""
 
     def build(self, n: Numbers) -> Picture:
-        """The picture."""
+        """Makes the picture of the file."""
         source, alpha = coded(n, (12, 10)), coded(n, (12, 10), components=1)
         box = 0, 0, 12, 10
         return picture(
@@ -61,39 +61,40 @@ class Clear(Base):
 
 
 class Last(Base):
-    """A valid file whose last latent, and no other, escapes."""
+    """Valid file in which only the last latent escapes."""
 
     def build(self, n: Numbers) -> Picture:
-        """The picture."""
+        """Makes the picture of the file."""
         level, lowest = np.zeros((9, 1, 1), np.int32), np.zeros((3, 1, 1), np.int32)
         level[8] = 65535
-        # The shift sees to it that no model takes the latent for certain.
+        # The shift ensures that no model takes the latent as certain.
         source = planes.encoded(Latents((level,), lowest), (2, 2), 256, shifts=(0, 7))
         return picture((2, 2), [layer("back", (0, 0, 2, 2), view(source))])
 
 
 def bits(values: Any) -> bytes:
-    """A coded array of 1 bit."""
+    """Coded array of 1-bit values [rows, columns]."""
     array = np.array(values)
     return arrays.encode(array[None], 1, np.ones(array.shape, bool))
 
 
 def full(rows: int, columns: int, value: int) -> bytes:
-    """A coded array of 1 bit that has one value everywhere."""
+    """Coded array of 1-bit values that are all equal."""
     return bits(np.full((rows, columns), value))
 
 
 def _data(change: Callable[[bytes], bytes]) -> Callable[[Base], bytes]:
-    """Planes with another stream."""
+    """Builder of a file with a changed stream of the planes."""
     return lambda b: b.edit(PLAN, "data", change)
 
 
 def _words(change: Callable[[bytes], bytes]) -> Callable[[Base], bytes]:
-    """Planes with other words in their stream."""
+    """Builder of a file with changed words in the stream of the planes."""
     return _data(lambda v: words(v, change))
 
 
 def _escapes(change: Callable[[bytes], bytes]) -> Callable[[Base], bytes]:
+    """Builder of a file with changed escapes of the planes."""
     return lambda b: b.edit(PLAN, "escapes", change)
 
 
@@ -107,7 +108,7 @@ def different(b: Base, at: int, **values: Any) -> Chunk:
 
 
 def _swapped(b: Base) -> bytes:
-    """The planes in the other order, which is not that of their first use."""
+    """File with planes that are not in the order of their first use."""
     back, disc = CLEAR_TEXR
     return write([
         *b.chunks[:COLOUR], b.chunks[ALPHA], b.chunks[COLOUR],

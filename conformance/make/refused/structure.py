@@ -1,4 +1,4 @@
-"""Files that must be refused: chunks in a wrong order or number, and values that do not fit."""
+"""Refused files: chunks in a wrong order or number, and values that contradict each other."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from .base import (
 
 
 def _long(chunk: Chunk) -> bytes:
-    """The payload with its last value, a small integer, in two bytes."""
+    """Payload with its last value, a small integer, encoded in two bytes."""
     return chunk.payload[:-1] + b"\xcc" + chunk.payload[-1:]
 
 

@@ -1,6 +1,6 @@
-"""Files that must be refused: values of chunks that are out of range, of a wrong type, or cut.
+"""Refused files: values of chunks that are out of range, of a wrong type, or cut off.
 
-Those at the ends of ranges are made from the tables of fields.
+Cases at the ends of ranges are made from the tables of fields.
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ CHUNKS: Mapping[str, tuple[type[Base], int, Sequence[Field]]] = {
     "shared": (poses.Posed, poses.COPY_TEXR, texr.SHARED_FIELDS),
     "motn": (motion.Moving, motion.MOTION, motn.FIELDS),
 }
-"""Where there is a chunk of each kind."""
+"""Base file and position of a chunk of each kind."""
 
 AMBIGUOUS = {
-    # A limit is exceeded too.
+    # These exceed a limit, too.
     "head size high", "head layers high", "head networks high", "layr segments high",
     "mesh gates high", "texr grid high", "plan size high", "motn intervals high",
-    # A number of the future is refused as unsupported.
+    # Numbers that a later version may use are refused as unsupported.
     "layr sampling low", "layr sampling high", "plan model low", "plan model high",
     "texr coder low", "texr coder high", "view coder low", "view coder high", "shared coder low",
     "shared coder high",
 }  # fmt: skip
-"""Values that may be refused with another class of error."""
+"""Values for which another class of error is allowed."""
 
 
 def _beyond(field: Field, end: str) -> int | None:
-    """What lies just beyond one end of a field's range; None if it would be a large file."""
+    """Number just beyond one end of the range of a field; None if it would make a large file."""
     number = field.low - 1 if end == "low" else field.high + 1
     if field.kind in ("int", "ints"):
         return number
@@ -51,6 +51,8 @@ def _beyond(field: Field, end: str) -> int | None:
 
 
 def _set(at: int, field: Field, number: int) -> Callable[[Base], bytes]:
+    """Builder of a file in which a field has a number, or a length, of `number`."""
+
     def build(b: Base) -> bytes:
         value: Any = number
         if field.kind == "str":
@@ -63,6 +65,7 @@ def _set(at: int, field: Field, number: int) -> Callable[[Base], bytes]:
 
 
 def _ranges() -> dict[str, Refused]:
+    """Cases of numbers just beyond the ranges of fields."""
     out = {}
     for kind, (base, at, fields) in CHUNKS.items():
         for field in fields:
@@ -78,10 +81,12 @@ def _ranges() -> dict[str, Refused]:
 
 
 def _cut(at: int) -> Callable[[Base], bytes]:
+    """Builder of a file with a payload that lacks its last byte."""
     return lambda b: b.payload(at, b.chunks[at].payload[:-1])
 
 
 def _cut_stream(at: int, key: str) -> Callable[[Base], bytes]:
+    """Builder of a file with a coded array that lacks its last byte."""
     return lambda b: b.edit(at, key, lambda v: v[:-1])
 
 
@@ -91,10 +96,11 @@ STREAMS = {
     "plan": ("support",),
     "motn": ("curve_classes", "shape_classes", "shape_deltas"),
 }
-"""Coded arrays of chunks that no other module cuts."""
+"""Coded arrays of chunks that are cut off here because no other module does it."""
 
 
 def _cuts() -> dict[str, Refused]:
+    """Cases of payloads and coded arrays that are cut off."""
     out = {}
     for kind, (base, at, _) in CHUNKS.items():
         title = f"The last value of {kind} ends early"
@@ -107,7 +113,7 @@ def _cuts() -> dict[str, Refused]:
 
 
 def _raw(key: str, packed: bytes) -> Callable[[Base], bytes]:
-    """The disc's LAYR with the bytes of one value."""
+    """Builder of a file with other bytes for one value in LAYR of the disc."""
 
     def build(b: Base) -> bytes:
         values = {k: msgpack.packb(v) for k, v in b.fields(DISC).items()} | {key: packed}

@@ -1,4 +1,4 @@
-"""Files that must be refused: faults of views of planes, of their masks and cuts."""
+"""Refused files: faults of views of planes, of their masks and cuts."""
 
 from __future__ import annotations
 
@@ -29,16 +29,17 @@ from .pyramids import (
 
 
 def _cuts(b: Base, cuts: list[int], **values: Any) -> bytes:
-    """The disc with cuts instead of a mask."""
+    """File in which the disc has cuts instead of a mask."""
     return b.set(DISC_TEXR, **{"cell": 0, "mask": b"", "cuts": cuts} | values)
 
 
 def _back_cuts(b: Base, cuts: list[int]) -> bytes:
+    """File in which the back has cuts."""
     return b.set(BACK_TEXR, cuts=cuts)
 
 
 def _many(b: Base) -> bytes:
-    """Nine layers that each show a raster of 2^24 samples with a mask."""
+    """File of nine layers that each show a raster of 2^24 samples with a mask."""
     side = 1 << 12
     texture = {"part": [0, 0, side, side], "cell": 6, "mask": bits(np.eye(64, dtype=int))}
     return write([
@@ -51,7 +52,7 @@ def _many(b: Base) -> bytes:
 
 
 def _carved(b: Base) -> bytes:
-    """A layer of 2^24 samples that 129 others cut."""
+    """File with a layer of 2^24 samples that 129 other layers cut."""
     side, others = 1 << 12, range(1, 130)
     box, part = [0, 0, side, side], {"part": [0, 0, side, side], "cuts": list(others)}
     shared = replace(b.chunks[DISC_TEXR], payload=msgpack.packb([0, 0]))
@@ -67,7 +68,7 @@ def _carved(b: Base) -> bytes:
 
 
 def _carving(b: Base) -> bytes:
-    """A layer of 2^24 samples that cuts itself, in front of 128 others."""
+    """File with a layer of 2^24 samples that cuts itself, in front of 128 others."""
     side, count = 1 << 12, 129
     shared = replace(b.chunks[DISC_TEXR], payload=msgpack.packb([0, 0]))
     own = {"part": [0, 0, side, side], "cell": 0, "mask": b"", "cuts": [count - 1]}

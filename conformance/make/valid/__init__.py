@@ -1,1 +1,1 @@
-"""Valid files; the cases of a module lie in ``cases/MODULE``."""
+"""Valid files; the cases of a module are in ``cases/MODULE``."""

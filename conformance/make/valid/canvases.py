@@ -1,4 +1,4 @@
-"""Valid cases of parts of pictures, of other sizes, and of canvases of extreme shape."""
+"""Valid cases of parts of pictures, of other sizes, and of canvases of extreme aspect ratio."""
 
 from __future__ import annotations
 
@@ -64,12 +64,12 @@ LONG = 4096
 
 
 def _thin(size: tuple[int, int], sampling: int) -> Build:
-    """A canvas one pixel wide or high, sampled directly or at the nodes of meshes."""
+    """Builder of a canvas one pixel wide or high, with direct or node sampling."""
 
     def build(n: Numbers) -> Picture:
         w, h = size
         dim = 3 * (1 + sampling)
-        # Two by two cells of 16 steps, a bit larger than the canvas.
+        # Two by two cells of 16 steps each, a little larger than the canvas.
         across, down = (n_pixels * 32 + 64 for n_pixels in size)
         mesh = grid_mesh((-1, -1), 2, 2, step=(across, down)) if sampling else None
         shape = ellipse((w * 0.6, h * 0.6), (w * 0.3, h * 0.3))

@@ -1,4 +1,4 @@
-"""Valid cases of the levels 2 and 3 of every profile."""
+"""Valid cases of levels 2 and 3 of every profile."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _case = CASES.case
 
 
 def _large(w: int, h: int) -> Build:
-    """A large canvas with a disc at its end."""
+    """Builder of a large canvas with a disc in its lower right corner."""
 
     def build(n: Numbers) -> Picture:
         shape = ellipse((w - 12, h - 9), (11, 8.5), unit=5)

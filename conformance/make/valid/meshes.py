@@ -1,4 +1,4 @@
-"""Valid cases of meshes: layers that are bent."""
+"""Valid cases of meshes and bent layers."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ _case = CASES.case
 UNIT = 1 << 24
 TURN: dict[str, Any] = {"matrix": (UNIT * 3 // 5, UNIT * 4 // 5, -UNIT * 4 // 5, UNIT * 3 // 5),
         "shift": (12001, -6003)}  # fmt: skip
-"""By an angle with the cosine 3/5."""
+"""Rotation by an angle whose cosine is 3/5, and a shift."""
 
 CLOSE: Args = {"region": [14, 5, 8, 6], "width": 32}
-"""A part, enlarged four times: 1/1024 pixel shows."""
+"""A part of the canvas, enlarged four times, so that 1/1024 pixel shows."""
 
 
 @_case("A layer on an unrefined mesh is bent", "mesh: connectivity", "pose: displacements",
@@ -56,6 +56,8 @@ def _bent_turned(n: Numbers) -> Picture:
 
 
 def _closing(split: Sequence[Sequence[int]], reach: int) -> Build:
+    """Builder of a bent disc on a mesh with given splits."""
+
     def build(n: Numbers) -> Picture:
         mesh = grid_mesh((0, -1), 3, 3, step=(512, 448), split=split)
         return on_back(n, disc(n, mesh, nodes=bend(n, mesh, reach)))
@@ -63,7 +65,7 @@ def _closing(split: Sequence[Sequence[int]], reach: int) -> Build:
     return build
 
 
-# In the order of the file, triangle 7 in the middle has the neighbours 4, 5 and 10.
+# In file order, triangle 7 in the middle has the neighbours 4, 5 and 10.
 for _name, _title, _split in (
     ("closing-1", "Faces next to one split triangle", [[4]]),
     ("closing-2", "A face between two split triangles and a whole one", [[4, 5]]),
@@ -94,7 +96,7 @@ def _parts(n: Numbers) -> Picture:
 
 
 def recoded(mesh: Mesh, symbols: Sequence[int], far: Sequence[int], wrap: int = 0) -> Mesh:
-    """A mesh with other symbols, and `wrap` added to its residuals."""
+    """Mesh with other symbols and far vertices, and with `wrap` added to its residuals."""
     kept = mesh.fields
     residuals = deltas.decode(kept["classes"], kept["deltas"], 2, kept["vertices"], "") + wrap
     classes, raw = deltas.encode(residuals)
@@ -105,7 +107,7 @@ def recoded(mesh: Mesh, symbols: Sequence[int], far: Sequence[int], wrap: int = 
 
 
 def symbols_of(mesh: Mesh) -> list[int]:
-    """The symbols of a mesh."""
+    """Connectivity symbols of a mesh."""
     count = mesh.fields["gates"]
     coded = arrays.decode(mesh.fields["symbols"], (1, 1, count), 4, np.ones((1, count), bool))
     return [int(v) for v in coded.ravel()]
@@ -116,7 +118,7 @@ def symbols_of(mesh: Mesh) -> list[int]:
 def _far(n: Numbers) -> Picture:
     mesh = grid_mesh((2, 1), 5, 4)
     symbols, far, triangles = [1, 1, 1], [], 0
-    # Which vertex a ranked symbol names is seen from the triangle that it makes.
+    # The vertex that a ranked symbol names is found from the triangle that it makes.
     for symbol in symbols_of(mesh)[3:]:
         triangles += symbol > 0
         if symbol > 1:
@@ -132,7 +134,7 @@ def _far(n: Numbers) -> Picture:
 def _overlaid(n: Numbers) -> Picture:
     one = grid_mesh((2, 1), 3, 2).base
     x, y = one.vertices.astype(int).T
-    # No parallelograms, or each corner would be just where it is expected.
+    # No two triangles are a parallelogram; otherwise each corner would be where it is predicted.
     other = np.stack([x + 2 + x * y // 40, y + 1 + x * x // 80], axis=1).astype(np.uint8)
     base = replace(
         one,
@@ -144,7 +146,7 @@ def _overlaid(n: Numbers) -> Picture:
 
 
 def _folded_mesh() -> tuple[Mesh, NDArray[np.int64]]:
-    """A mesh, and displacements that push its middle over what is on its right.
+    """Mesh, and displacements that push its middle over the part on its right.
 
     The faces that are turned over have the lowest numbers.
     """
@@ -222,13 +224,13 @@ def _pieces(n: Numbers) -> Picture:
 @_case("A mesh wider than 4,096 pixels, for which weights are computed from fewer bits, and "
        "displacements of 15 bits and more", "outline: weights", renders=[WHOLE, CLOSE])  # fmt: skip
 def _wide(n: Numbers) -> Picture:
-    # Two refinements of the triangles at the canvas: faces are small against the whole.
+    # The triangles at the canvas are refined twice, so that faces are small compared to the mesh.
     plain = grid_mesh((-15001, -3003), 15, 3, step=(140001, 140003))
     corners = plain.base.positions[plain.base.triangles] >> 10
     near = np.flatnonzero((corners.min(1) < 12).all(1) & (corners.max(1) > 0).all(1))
     split = [near.tolist(), range(4 * len(near))]
     mesh = grid_mesh((-15001, -3003), 15, 3, step=(140001, 140003), split=split)
-    # About twice as large, seen from the corner of the canvas.
+    # The displacements make the layer about twice as large, about the corner of the canvas.
     pose = Pose(nodes=(mesh.refined.nodes >> 6) * 3 // 4 + bend(n, mesh))
     shapes = ellipse((5, 6), (4, 5)), polygon((9, -3000), (13, -2800), (11, 3000))
     plane = texture(n, grid=(9, 8))

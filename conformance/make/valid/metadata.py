@@ -1,4 +1,4 @@
-"""Valid cases of metadata, private chunks, and files that are something else too."""
+"""Valid cases of metadata, private chunks, and files that are valid in another format too."""
 
 from __future__ import annotations
 
@@ -27,24 +27,24 @@ _case = CASES.case
 
 
 def _plain(n: Numbers) -> bytes:
-    """A small file, higher than it is wide."""
+    """Bytes of a small file, higher than it is wide."""
     return to_bytes(picture((8, 12), [layer("back", (0, 0, 8, 12), texture(n))], network(n)))
 
 
 def with_chunks(data: bytes, *chunks: Chunk) -> bytes:
-    """A file with chunks before TAIL."""
+    """File with other chunks before TAIL."""
     parts = read(data)
     return write([*parts[:-1], *chunks, parts[-1]])
 
 
 def info(encoder: str = "", settings: str = "", areas: tuple[int, ...] = ()) -> Chunk:
-    """An iNFO."""
+    """Chunk iNFO."""
     values = {"encoder": encoder, "settings": settings, "areas": list(areas)}
     return Chunk(meta.INFO_TYPE, pack(meta.INFO_FIELDS, values))
 
 
 def history(data: bytes, content: bytes, **new: Any) -> Chunk:
-    """An uNDO that is bound to the chunks of a file, perhaps with other values."""
+    """Chunk uNDO that is bound to the chunks of a file, perhaps with other values."""
     present = read(data)[:-1]
     state = undo.digest(present, present[0].old)
     values = {"state": state, "size": len(content), "zstd": frame(content), **new}
@@ -53,7 +53,7 @@ def history(data: bytes, content: bytes, **new: Any) -> Chunk:
 
 _CMYK = bytes(16) + b"CMYK" + bytes(112)
 _TURNED = b"MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0"
-"""EXIF with the orientation 6."""
+"""EXIF block with orientation 6."""
 
 
 @_case("A profile of another colour space, and an orientation: neither changes a sample",
@@ -155,7 +155,7 @@ def _script_deep(n: Numbers) -> bytes:
 
 
 def scripted(zstd: bytes, size: int) -> bytes:
-    """The base file of broken motions with a script."""
+    """Base file of refused motions, with a script."""
     chunks = [
         changed(c, {"size": size, "script": zstd}) if c.type == motn.TYPE else c
         for c in Moving().chunks
@@ -173,7 +173,7 @@ def _zip(n: Numbers) -> bytes:
         entry = zipfile.ZipInfo("a.txt")
         entry.create_system = 3
         files.writestr(entry, "not a picture")
-        # The archive ends in a comment, which takes what follows it in the file.
+        # The archive ends in a comment, which includes what follows the archive in the file.
         files.comment = bytes(4 + tail)
     packed = archive.getvalue()[: -(4 + tail)]
     return with_chunks(data, Chunk("ziPa", packed))
@@ -219,7 +219,7 @@ def _tree(n: Numbers) -> bytes:
 @_case("A history of one edit does not change the picture", "CHK-20", "MET-13", "MET-15")
 def _undo(n: Numbers) -> bytes:
     data = to_bytes(layered(n))
-    # No chunks, and one step "{}" that refers to all chunks, in one raw zstd block.
+    # The history has no chunks of its own, and one step "{}" that refers to all chunks of the file.
     count = len(read(data)) - 1
     content = b"\x92\x90\x91\x92\xa2{}" + bytes([0x90 + count, *range(count)])
     return with_chunks(data, history(data, content, zstd=one_block(content)))

@@ -1,4 +1,4 @@
-"""Valid cases of motion. The first render of each is the still, as every reader can show it."""
+"""Valid cases of motion; the first render of each is the still, which every reader can show."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ ONCE = Timeline(1501, 25, False, 4, 4, '{"version": 1, "preset": "sway"}\n')
 
 
 def track(n: Numbers, mesh: Mesh, line: Timeline, modes: int = 2, reach: int = 24) -> Track:
-    """Random curves within one, and random shapes within `reach` units of the timeline."""
+    """Track of random curves of magnitude 1 or less, and random shapes up to `reach` units."""
     return Track(
         n.integers(-256, 256, (modes, line.coefficients)),
         n.integers(-reach, reach, (modes, *mesh.refined.nodes.shape)),
@@ -47,20 +47,20 @@ def track(n: Numbers, mesh: Mesh, line: Timeline, modes: int = 2, reach: int = 2
 
 
 def moving(image: Picture, line: Timeline, tracks: Mapping[str, Track]) -> Picture:
-    """An image whose layers move, by their names."""
+    """Picture whose layers move, by name."""
     layers = [replace(v, track=tracks.get(v.name)) for v in image.layers]
     return replace(image, layers=Layers(layers), timeline=line)
 
 
 def _disc(n: Numbers, line: Timeline, modes: int = 2, reach: int = 24) -> Picture:
-    """A disc that moves on a back layer."""
+    """Picture of a disc that moves on a back layer."""
     mesh = grid_mesh((2, 1), 5, 4)
     image = on_back(n, disc(n, mesh))
     return moving(image, line, {"disc": track(n, mesh, line, modes, reach)})
 
 
 def _at(*times: float) -> list[Args]:
-    """The still, and renders at some times, the first of them enlarged."""
+    """Arguments of renders: the still, then some times, of which the first is enlarged."""
     return [WHOLE, {"time": times[0], **CLOSE}, *({"time": t} for t in times[1:])]
 
 
@@ -146,7 +146,7 @@ def _moves_far(n: Numbers) -> Picture:
     mesh = grid_mesh((2, 1), 5, 4)
     nodes = mesh.refined.nodes
     shapes = np.zeros((2, *nodes.shape), np.int64)
-    # Not clamped, this node of the middle would go straight down.
+    # Without clamping, this node in the middle would go straight down.
     shapes[:, np.flatnonzero((nodes == [10 << 10, 9 << 10]).all(1))[0]] = [
         [(1 << 20) - 1, (1 << 20) - 1],
         [0, (1 << 20) - 1],
@@ -177,7 +177,7 @@ def _moves_nowhere(n: Numbers) -> Picture:
 
 
 def _bodies(n: Numbers, numbers: tuple[int, int]) -> Picture:
-    """A bar on a disc on a back layer, cut by each other; disc and bar move alike."""
+    """Picture of a bar on a disc on a back layer, which cut each other; disc and bar move alike."""
     meshes = grid_mesh((4, 2), 7, 7), grid_mesh((9, 6), 8, 4)
     image = pieces(n, {})
     layers = [

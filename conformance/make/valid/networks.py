@@ -27,9 +27,11 @@ _case = CASES.case
 
 
 def _octaves(octaves: int) -> Build:
+    """Builder of a layer whose network has `octaves` octaves."""
+
     def build(n: Numbers) -> Picture:
         back = layer("back", (0, 0, 16, 12), texture(n, dim=2, reach=1))
-        # In single precision, what is left of a feature in the highest octaves is little.
+        # In the highest octaves, single precision leaves few correct bits of a feature.
         net = network(n, dim=2, octaves=octaves, hidden=8, contrast=0.6 if octaves < 9 else 0.2)
         return picture((16, 12), [back], net)
 
@@ -55,7 +57,7 @@ def _network_wide(n: Numbers) -> Picture:
 def _network_steps(n: Numbers) -> Picture:
     net = network(n, dim=3, octaves=0, hidden=4)
     smallest, largest = np.float16(2.0**-24), np.float16(65504)
-    # Hidden values that are huge, times steps that are tiny.
+    # Huge hidden values are multiplied by tiny steps.
     steps = net.steps.copy()
     steps[:2] = largest, smallest
     steps[4:] = smallest
@@ -68,7 +70,7 @@ def _network_steps(n: Numbers) -> Picture:
 
 
 def _huge(n: Numbers) -> Network:
-    """A network in which infinities arise, of both signs, and differences of them."""
+    """Network in which infinities of both signs arise, and differences of infinities."""
     net = network(n, dim=3, octaves=0, hidden=4, depth=8)
     steps = np.full_like(net.steps, np.float16(65504))
     return replace(net, steps=steps)

@@ -1,4 +1,4 @@
-"""Valid cases of poses: layers that are moved, recoloured or hidden, and shared textures."""
+"""Valid cases of poses, that is of moved, recoloured and hidden layers, and of shared textures."""
 
 from __future__ import annotations
 
@@ -32,6 +32,8 @@ _case = CASES.case
 
 
 def _affine(name: str, title: str, matrix: Sequence[int], shift: tuple[int, int]) -> None:
+    """Registers a case with an affine map."""
+
     def build(n: Numbers) -> Picture:
         a, b, c, d = matrix
         return on_back(n, disc(n, matrix=(a, b, c, d), shift=shift))

@@ -1,4 +1,4 @@
-"""Valid cases of pyramid textures, with latents from seeded numbers: no encoder has a part in it.
+"""Valid cases of pyramid textures, with random latents: they are independent of the encoder.
 
 Streams and pictures depend on the weights of the registered model.
 """
@@ -55,17 +55,17 @@ def coded(
     """Planes of random latents.
 
     Args:
-        n: Where they come from.
-        size: Columns and rows.
-        levels: Levels of the pyramid.
-        step: Quantization step, 2**(step / 64).
-        components: 1 or 3.
-        cell: Side of a cell is 2**cell samples.
-        cells: Cells that are stored.
-        reach: Largest latent of level 1; about half of all are 0.
-        shifts: Of the scale index, per level: luma, chroma.
-        grey: Finest levels without chroma.
-        large: Latents that stand in the middle of level 1, from the left, channel by channel.
+        n: Source of random numbers.
+        size: Width and height of the raster in samples.
+        levels: Number of levels of the pyramid.
+        step: Quantization step in 1/64 octave: it is 2**(step / 64) levels of 8 bits.
+        components: 1 for grey, 3 for colour.
+        cell: Binary logarithm of the side of a cell in samples.
+        cells: bool [rows, columns] cells that have latents; all by default.
+        reach: Largest magnitude of a latent of level 1; about half of all latents are 0.
+        shifts: Shifts of the scale index: luma and chroma of each level.
+        grey: Number of the finest levels without chroma.
+        large: Latents in the middle of level 1, from the left, channel by channel.
     """
     columns, rows = (-(-v >> levels) for v in size)
     most = max(round(60 * 2 ** (levels - step / 64)), 1)
@@ -95,12 +95,12 @@ def view(
     mask: _Mask | None = None,
     cuts: Occlusion | None = None,
 ) -> PyramidTexture:
-    """A view of planes, of all of them by default."""
+    """View of planes; by default of the whole raster."""
     return PyramidTexture(source, alpha, part or (0, 0, *source.size), cell, mask, cuts)
 
 
 def one(shown: PyramidTexture, opaque: bool = True) -> Picture:
-    """A picture of one layer that shows a view in its place."""
+    """Picture of one layer that shows a view in its place."""
     _, _, w, h = shown.part
     return picture((w, h), [layer("back", (0, 0, w, h), shown)], opaque=opaque)
 
@@ -207,6 +207,7 @@ def _pyramid_escapes(n: Numbers) -> Picture:
 
 
 def _escaping(n: Numbers) -> Picture:
+    """Picture with latents that escape."""
     large = 40, -60, 200, -7000, 9000, 65535, -65535, 55
     return one(view(coded(n, (18, 14), step=64, large=large)))
 

@@ -44,7 +44,7 @@ MIX = (4096, -900, 300, 200, 0, 3000, 1000, 0, 500, 0, 4096, -200)
 def _sampled(
     n: Numbers, sampling: int, *, mesh: bool, masked: bool = False, **pose: Any
 ) -> tuple[Picture, dict[str, Any]]:
-    """A ring on a back layer that are sampled in the same way; and the mesh of the ring."""
+    """Picture of a ring on a back layer with the same sampling; and the mesh of the ring."""
     dim = 6 if sampling == BOTH else 4
     features = dim // 2 if sampling == BOTH else dim
     grid = grid_mesh((2, 1), 5, 4, split=[[3, 8, 9, 21]]) if mesh or sampling in (1, 2) else None
@@ -63,6 +63,7 @@ def _sampled(
 
 
 def _case(sampling: int, option: str, tests: Sequence[str], build: Build, *more: Args) -> None:
+    """Registers a case of a sampling with an option."""
     topics = () if sampling == DIRECT else ("sampling: node",)
     titles = {
         "turned": "turned",
@@ -111,7 +112,7 @@ for _sampling in (BOTH, LOCAL, GLOBAL):
 
 
 def _plain(n: Numbers, sampling: int, bent: bool, features: int = 3, **pose: Any) -> Picture:
-    """A ring with a mesh on a back layer, which is sampled in the same way."""
+    """Picture of a ring with a mesh on a back layer with the same sampling."""
     dim = 2 * features if sampling == BOTH else features
     mesh = None
     back = grid_mesh((-1, -1), 2, 2, step=(832, 640))
@@ -129,6 +130,8 @@ def _plain(n: Numbers, sampling: int, bent: bool, features: int = 3, **pose: Any
 
 
 def _node(name: str, title: str, sampling: int, bent: bool, **pose: Any) -> None:
+    """Registers a case of node sampling."""
+
     def build(n: Numbers) -> Picture:
         return _plain(n, sampling, bent, **pose)
 

@@ -45,6 +45,8 @@ def _diffusion(n: Numbers) -> Picture:
 
 
 def _bits(bits: int) -> Build:
+    """Builder of a layer whose codes and weights have `bits` bits."""
+
     def build(n: Numbers) -> Picture:
         back = layer("back", (0, 0, 14, 12), texture(n, grid=(7, 5), bits=bits))
         return picture((14, 12), [back], network(n, bits=bits))

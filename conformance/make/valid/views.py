@@ -38,13 +38,13 @@ _Mask = NDArray[np.bool_]
 
 
 RING = ellipse((12, 9), (7, 5.5))
-"""The disc of `objects`."""
+"""Boundary of the disc of `objects`."""
 
 
 def objects(
     back: PyramidTexture, front: PyramidTexture, pose: Pose = REST, opaque: bool = True
 ) -> Picture:
-    """A disc over a back layer, each with a view, the disc posed."""
+    """Picture of a disc over a back layer, each with a view; the disc has a pose."""
     box = 4, 3, 16, 12
     return picture(
         SIZE,
@@ -57,14 +57,14 @@ def objects(
 
 
 def _inside(box: Box) -> _Mask:
-    """Which pixels of a box have their centre in the disc."""
+    """Mask bool [h, w] of the pixels of a box whose centres are in the disc."""
     x, y, w, h = box
     across, down = np.arange(w) + x + 0.5 - 12, np.arange(h)[:, None] + y + 0.5 - 9
     return (across / 7) ** 2 + (down / 5.5) ** 2 < 1
 
 
 def _cells(inside: _Mask, cell: int) -> _Mask:
-    """Cells with any of these samples."""
+    """Mask of the cells that have any of the samples `inside`."""
     side = 1 << cell
     h, w = inside.shape
     out = np.zeros((-(-h // side), -(-w // side)), bool)
@@ -94,7 +94,7 @@ def _pyramid_cells(n: Numbers) -> Picture:
 
 
 def _cut(n: Numbers, pose: Pose = REST) -> Picture:
-    """As `objects`, with views that the boundary of the disc cuts."""
+    """Picture as `objects`, with views that the boundary of the disc cuts."""
     source, box = coded(n, SIZE, levels=3), (4, 3, 16, 12)
     ring = Boundary(4, (RING,))
     back = view(source, cuts=Occlusion.of([1], 0, [None, ring], (0, 0, *SIZE)))
@@ -154,7 +154,10 @@ _PIECES = [{"layers": [name]} for name in ("back", "disc", "bar")]
 
 
 def pieces(n: Numbers, poses: dict[str, Pose], copied: str = "") -> Picture:
-    """A bar over a disc over a back layer, cut by each other, posed; then a copy of one."""
+    """Picture of a bar over a disc over a back layer, which cut each other, in poses.
+
+    With `copied`, a copy of that layer is in front.
+    """
     size = 40, 30
     source = coded(n, size, levels=3)
     shapes = (
@@ -213,7 +216,7 @@ def _pyramid_cuts_bent(n: Numbers) -> Picture:
 
 
 def _masked(made: Picture, name: str, mask: _Mask, cell: int) -> Picture:
-    """A picture with a mask beside the cuts of a layer."""
+    """Picture with a mask beside the cuts of a layer."""
     layers = list(made.layers)
     at = [v.name for v in layers].index(name)
     shown = layers[at].texture
