@@ -22,7 +22,15 @@ class Editable(Generic[Edited]):
         raise NotImplementedError  # only subclasses know the picture of the layer
 
     def moved(self, dx: float, dy: float) -> Edited:
-        """Moves the layer by `dx`, `dy`; moving there and back is exact."""
+        """Moves the layer by `dx`, `dy`; moving there and back is exact.
+
+        Examples:
+            >>> import proxyimg_codec as pxi
+            >>> image = pxi.open("photo.pxi")
+            >>> moved = image.layers["disc"].moved(6, -2)
+            >>> moved.layers["disc"].moved(-6, 2).render().tobytes() == image.render().tobytes()
+            True
+        """
         return self._edited("move", by=[dx, dy])
 
     def rotated(self, degrees: float, pivot: Pair | None = None) -> Edited:
@@ -55,6 +63,13 @@ class Editable(Generic[Edited]):
 
         Args:
             handles: Vectors dx, dy by canvas points x, y on the layer; (0, 0) pins a point.
+
+        Examples:
+            >>> import proxyimg_codec as pxi
+            >>> image = pxi.open("photo.pxi")
+            >>> bent = image.layers["disc"].dragged({(32, 12): (5, -2), (32, 36): (0, 0)})
+            >>> bent.layers["disc"].pose.bent
+            True
         """
         return self._edited("drag", handles=[[*p, *v] for p, v in handles.items()])
 
@@ -123,6 +138,14 @@ class Editable(Generic[Edited]):
             tint: ``#rrggbb``; colours become shades of it.
             matrix: The 12 entries of a 3 x 4 matrix, row by row, applied to (red, green, blue, 1)
                 in 0..1.
+
+        Examples:
+            >>> import proxyimg_codec as pxi
+            >>> image = pxi.open("photo.pxi")
+            >>> grey = image.layers["disc"].recoloured(saturation=0).render()
+            >>> red, green, blue = grey[24, 32].tolist()
+            >>> max(red, green, blue) - min(red, green, blue) <= 1
+            True
         """
         values = {"hue": hue, "saturation": saturation, "brightness": brightness, "tint": tint}
         return self._edited("recolour", **values, matrix=None if matrix is None else list(matrix))
