@@ -14,10 +14,12 @@ Kinds:
 from __future__ import annotations
 
 import importlib
-from importlib.metadata import entry_points
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import UsageError
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoints
 
 BUILT_IN = {
     "segmenters": {"regions": "proxyimg_codec.encoder.shapes.segment:segment"},
@@ -31,9 +33,17 @@ BUILT_IN = {
 """Plug-ins of this package: ``module:attribute`` by kind and name."""
 
 
+def _added(kind: str) -> EntryPoints:
+    """Entry points of other packages for a kind."""
+    # Imports e-mail, ZIP files and sockets: a tenth of a second that decoding does not need.
+    from importlib.metadata import entry_points
+
+    return entry_points(group=f"proxyimg_codec.{kind}")
+
+
 def names(kind: str) -> list[str]:
     """Names of all plug-ins of a kind, built-in ones first."""
-    added = {e.name for e in entry_points(group=f"proxyimg_codec.{kind}")}
+    added = {e.name for e in _added(kind)}
     return [*BUILT_IN[kind], *sorted(added - set(BUILT_IN[kind]))]
 
 
@@ -47,6 +57,7 @@ def find(kind: str, name: str) -> Any:
     if name in BUILT_IN[kind]:
         module, _, attribute = BUILT_IN[kind][name].partition(":")
         return getattr(importlib.import_module(module), attribute)
-    for entry in entry_points(group=f"proxyimg_codec.{kind}", name=name):
-        return entry.load()
+    for entry in _added(kind):
+        if entry.name == name:
+            return entry.load()
     raise UsageError(f"{kind}: {name!r} is unknown; there are {', '.join(names(kind))}")

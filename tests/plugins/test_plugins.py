@@ -22,7 +22,7 @@ def added(monkeypatch):
     def entry_points(group, name=None):
         return [entry] if group == entry.group and name in (None, "halves") else []
 
-    monkeypatch.setattr(plugins, "entry_points", entry_points)
+    monkeypatch.setattr("importlib.metadata.entry_points", entry_points)
 
 
 @pytest.mark.encoder
