@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import model
-from .codec import read, write
+from .codec import read
 from .container.chunks import Chunk
 from .edit.methods import Editable
 from .errors import UnsupportedError
@@ -71,6 +71,8 @@ class Image(PictureHandle):
         return hash((self._picture.size, tuple(v.name for v in self._picture.layers)))
 
     def __reduce__(self) -> tuple[Callable[..., Image], tuple[bytes, tuple[str, ...]]]:
+        from .codec import write
+
         return _restored, (write.serialized(self), self.damage)
 
     @property
@@ -81,6 +83,8 @@ class Image(PictureHandle):
     @property
     def chunks(self) -> tuple[Chunk, ...]:
         """Chunks of the file of this picture, without uNDO and TAIL."""
+        from .codec import write
+
         return write.state(self)
 
     def _with(self, picture: model.Picture) -> Image:
@@ -228,6 +232,8 @@ class Image(PictureHandle):
         Raises:
             LimitError: The file would exceed what readers accept by default.
         """
+        from .codec import write
+
         return write.to_bytes(self)
 
     def save(self, path: str | os.PathLike[str]) -> None:

@@ -13,7 +13,6 @@ from ..errors import LimitError, PxiError
 from ..io.files import read_bytes
 from ..limits import DEFAULT_LIMITS, Budget, Limits
 from ..model import Picture
-from . import salvage
 from .unpack import unpack
 
 _END = Chunk("TAIL", b"")
@@ -36,6 +35,8 @@ def from_bytes(data: bytes, limits: Limits = DEFAULT_LIMITS, *, tolerant: bool =
     damage: tuple[str, ...] = ()
     try:
         if tolerant:
+            from . import salvage
+
             content, damage = salvage.parse(data, limits)
             picture = unpack(content, Budget(limits), damage)
         else:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from ..container import meta, texr
+from ..container.chunks import PADDING
 from ..container.content import Container
 from ..errors import FormatError
 from ..geometry import boundary as boundaries
@@ -22,7 +23,6 @@ from ..texture import implicit, network, planes, pyramid
 from ..texture.network import Network
 from ..texture.occlusion import Occlusion
 from ..texture.pyramid import Texture
-from .write import PADDING
 
 
 def unpack(c: Container, budget: Budget, damage: tuple[str, ...] = ()) -> Picture:

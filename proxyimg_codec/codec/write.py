@@ -6,17 +6,11 @@ from dataclasses import replace
 from weakref import WeakKeyDictionary
 
 from ..container.check import check
-from ..container.chunks import Chunk
+from ..container.chunks import PADDING, Chunk
 from ..container.file import present, serialize
 from ..limits import SMALL_FILE, Budget
 from ..model import Picture, Pictured
 from .pack import pack
-
-PADDING = "paDD"
-"""Type of a chunk that pads a file which is too small for the limits that it needs [SEC-3].
-
-Readers drop it.
-"""
 
 _CHUNKS: WeakKeyDictionary[Picture, tuple[Chunk, ...]] = WeakKeyDictionary()
 

@@ -37,6 +37,13 @@ CHUNK_MAX = (1 << 31) - 1
 """Most bytes of a payload."""
 
 
+PADDING = "paDD"
+"""Type of a chunk that pads a file which is too small for the limits that it needs [SEC-3].
+
+Readers drop it.
+"""
+
+
 @dataclass(frozen=True)
 class Chunk:
     """A typed piece of a file, without its CRC.
