@@ -2,6 +2,7 @@
 
 import importlib.util
 import io
+import os
 import shutil
 import subprocess
 import sys
@@ -15,6 +16,10 @@ from tests.support import files
 from tests.support.paths import DATA, ROOT, TESTS
 from tests.support.pictures import disc, smooth
 from tests.support.tools import Ran, one_line
+
+# Threads of torch that wait must not spin: where other programs run too that took 7 times as long.
+# Programs that tests start inherit it.
+os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 ENCODE = ("cv2", "OpenImageIO", "onnx", "torch", "tqdm")
 """What the extra ``encode`` installs."""

@@ -91,7 +91,7 @@ def test_python_blocks_run(page, folder):
     if not (folder / "photo.pxi").exists():
         run([*tool("pxi-encode"), "photo.png", "--preset", "fast"], folder)
     for block in blocks(page, "python"):
-        env = {"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin"}
+        env = {"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin", "OMP_WAIT_POLICY": "PASSIVE"}
         done = subprocess.run(
             [sys.executable, "-W", "error", "-c", block],
             cwd=folder, env=env, capture_output=True, text=True,

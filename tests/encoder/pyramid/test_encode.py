@@ -159,7 +159,7 @@ def test_relaxed_latents_lie_between_their_neighbours():
 
 
 def test_windows_change_little(monkeypatch):
-    picture = textured(192, 160)
+    picture = textured(128, 96)
     raster = Raster(picture.astype(np.float32))
     whole, _ = pyramid.encode(raster, 300, Effort(0, 4), 0, lambda n: None)
     monkeypatch.setattr(pyramid, "WINDOW", 64)
