@@ -254,7 +254,7 @@ PICTURES = {  # what is stored (an array is saved as it is), and what must come 
     "1x9": (gradient(9, 1), gradient(9, 1)),
     "9x1": (gradient(1, 9), gradient(1, 9)),
     "2x2": (gradient(2, 2), gradient(2, 2)),
-    "3000x2": (gradient(2, 3000), gradient(2, 3000)),
+    "6001x2": (gradient(2, 6001), gradient(2, 6001)),
     "grey": (GREY, GREY.repeat(3, 2)),
     "grey-alpha": (np.dstack([GREY, ALPHA]), rgba(GREY, ALPHA)),
     "rgba": (rgba(GREY, ALPHA), rgba(GREY, ALPHA)),
