@@ -20,13 +20,13 @@ from .codec import read
 from .container.chunks import Chunk
 from .edit.methods import Editable
 from .errors import UnsupportedError
-from .handles import LayerHandle, PictureHandle
+from .handles import LayerHandle, MadeOnce, PictureHandle
 from .io.files import write_atomically
 from .limits import DEFAULT_LIMITS, Limits
 from .model import Layers, Pictured
 from .render import pixels
 from .render.cache import Cache
-from .render.moment import at
+from .render.moment import at, displacements
 
 if TYPE_CHECKING:
     from .animate.motion import Motion
@@ -41,15 +41,13 @@ class Image(PictureHandle):
     Args:
         picture: The picture as data, or another handle to it.
         cache: Computed colours to share with other images; by default a new, empty cache.
-
-    Attributes:
-        picture: The picture as data.
-        cache: Computed colours, shared with the images made from this one.
     """
+
+    __slots__ = ("_cache",)
 
     def __init__(self, picture: Pictured, cache: Cache | None = None) -> None:
         super().__init__(picture.picture)
-        self._cache = cache or Cache()
+        self._cache = Cache() if cache is None else cache
 
     @property
     def cache(self) -> Cache:
@@ -63,14 +61,18 @@ class Image(PictureHandle):
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Image):
             return NotImplemented
-        if self._picture is other._picture:
+        one, two = self._picture, other._picture
+        if one is two:
             return True
-        return self.chunks == other.chunks and self.history == other.history
+        saved = self.chunks == other.chunks and one.history == two.history
+        return saved and displacements(one) == displacements(two)
 
     def __hash__(self) -> int:
         return hash((self._picture.size, tuple(v.name for v in self._picture.layers)))
 
-    def __reduce__(self) -> tuple[Callable[..., Image], tuple[bytes, tuple[str, ...]]]:
+    def __reduce__(self) -> tuple[Callable[..., Image], tuple[Any, ...]]:
+        if any(displacements(self._picture)):  # more than a file can hold
+            return Image, (self._picture,)
         from .codec import write
 
         return _restored, (write.serialized(self), self.damage)
@@ -78,7 +80,7 @@ class Image(PictureHandle):
     @property
     def layers(self) -> Layers[Layer]:
         """Layers back to front; a layer is addressed by its position or its name."""
-        return Layers(Layer(self, k) for k in range(len(self._picture.layers)))
+        return Layers.over(MadeOnce(len(self._picture.layers), lambda k: Layer(self, k)))
 
     @property
     def chunks(self) -> tuple[Chunk, ...]:
@@ -108,6 +110,8 @@ class Image(PictureHandle):
             >>> len(moved.history)
             1
         """
+        if not operations:
+            return self
         from .edit.script import apply
 
         return self._with(apply(self._picture, operations))
@@ -261,6 +265,8 @@ class Layer(LayerHandle, Editable[Image]):
         position: Position of the layer in the picture, counted from the back, from 0.
     """
 
+    __slots__ = ("_image",)
+
     def __init__(self, image: Image, position: int) -> None:
         super().__init__(image.picture, position)
         self._image = image
@@ -282,7 +288,6 @@ class Layer(LayerHandle, Editable[Image]):
         return hash((self.image, self.position))
 
     def __reduce__(self) -> tuple[type[Layer], tuple[Image, int]]:
-        # `data` must stay the very layer that the picture has.
         return Layer, (self.image, self.position)
 
     def _edited(self, op: str, **values: Any) -> Image:

@@ -5,8 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Self, TypeVar, overload
 
 from .container.chunks import Chunk
 from .container.undo import Step
@@ -22,13 +22,29 @@ from .texture.occlusion import Moved
 from .texture.planes import Planes
 from .texture.pyramid import Texture
 
+T = TypeVar("T")
 
-class PictureHandle:
+
+class Handle:
+    """Something that never changes, so that its copies are itself."""
+
+    __slots__ = ()
+
+    def __copy__(self) -> Self:
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        return self
+
+
+class PictureHandle(Handle):
     """Handle to a picture, with read-only access to its fields.
 
     Attributes:
         picture: The picture as data.
     """
+
+    __slots__ = ("__weakref__", "_picture")
 
     def __init__(self, picture: Picture) -> None:
         self._picture = picture
@@ -109,16 +125,19 @@ class PictureHandle:
         return self._picture.planes
 
 
-class LayerHandle:
+class LayerHandle(Handle):
     """Handle to a layer, given by its picture and position, with read-only access to its fields.
 
     Attributes:
         position: Position of the layer in the picture, counted from the back, from 0.
     """
 
+    __slots__ = ("__weakref__", "_picture", "_position")
+
     def __init__(self, picture: Picture, position: int) -> None:
+        picture.layers[position]  # it exists
         self._picture = picture
-        self._position = position
+        self._position = position % len(picture.layers)
 
     @property
     def position(self) -> int:
@@ -189,3 +208,34 @@ class LayerHandle:
     def moved_neighbours(self) -> Moved:
         """Layers and boundaries that have moved relative to this layer since its view was cut."""
         return neighbours.moved_neighbours(self._picture, self.data)
+
+
+class MadeOnce(Sequence[T]):
+    """A sequence whose items are made when they are first asked for.
+
+    Args:
+        count: Number of items.
+        make: Makes the item at a position.
+    """
+
+    def __init__(self, count: int, make: Callable[[int], T]) -> None:
+        self._count, self._make = count, make
+        self._made: dict[int, T] = {}
+
+    def __len__(self) -> int:
+        return self._count
+
+    @overload
+    def __getitem__(self, key: int) -> T: ...
+
+    @overload
+    def __getitem__(self, key: slice) -> tuple[T, ...]: ...
+
+    def __getitem__(self, key: int | slice) -> T | tuple[T, ...]:
+        """Returns the item at a position, or those of a slice."""
+        place = range(self._count)[key]
+        if isinstance(place, range):
+            return tuple(self[k] for k in place)
+        if place not in self._made:
+            self._made[place] = self._make(place)
+        return self._made[place]

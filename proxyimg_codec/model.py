@@ -40,7 +40,22 @@ class Layers(Sequence[L_co]):
     """Sequence of layers, back to front; a layer is addressed by its position or its name."""
 
     def __init__(self, layers: Iterable[L_co]) -> None:
-        self._layers = tuple(layers)
+        self._layers: Sequence[L_co] = tuple(layers)
+
+    @classmethod
+    def over(cls, layers: Sequence[L_co]) -> Layers[L_co]:
+        """Layers of a sequence that never changes and may make them when they are asked for."""
+        made = cls(())
+        made._layers = layers
+        return made
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Layers):
+            return NotImplemented
+        return self is other or tuple(self) == tuple(other)
+
+    def __hash__(self) -> int:
+        return hash(tuple(layer.name for layer in self))
 
     def __len__(self) -> int:
         return len(self._layers)
@@ -61,7 +76,7 @@ class Layers(Sequence[L_co]):
             UsageError: There is no such layer.
         """
         if isinstance(key, slice):
-            return self._layers[key]
+            return tuple(self._layers[key])
         if isinstance(key, str):
             for layer in self._layers:
                 if layer.name == key:

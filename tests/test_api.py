@@ -14,7 +14,9 @@ import proxyimg_codec as pxi
 from conformance.make.builders import Numbers, disc, on_back
 from proxyimg_codec import model
 from proxyimg_codec.container.chunks import Chunk, read
+from proxyimg_codec.model import Layers
 from tests.support import moving, pyramids
+from tests.support.files import MOVING, SMALL
 from tests.support.images import changed
 from tests.support.paths import ROOT
 
@@ -276,3 +278,44 @@ def test_memory_does_not_grow(uncollected):
     finally:
         tracemalloc.stop()
     assert grown < 20 * 1500
+
+
+@pytest.mark.parametrize("how", [copy.copy, copy.deepcopy, lambda v: pickle.loads(pickle.dumps(v))])
+def test_a_moment_of_a_motion_survives_copies(how):
+    """It is displaced by less than a file can say."""
+    moment = pxi.open(MOVING).at(0.13)
+    again = how(moment)
+    assert again == moment
+    np.testing.assert_array_equal(again.render(scale=2), moment.render(scale=2))
+    assert moment != pxi.open(MOVING).at(0.31)
+
+
+def test_nothing_of_a_handle_can_be_set():
+    image = pxi.open(SMALL)
+    for handle in (image, image.layers["disc"]):
+        for name in ("picture", "name", "anything"):
+            with pytest.raises(AttributeError):
+                setattr(handle, name, 1)
+
+
+def test_layers_are_equal_as_their_images_are():
+    image, moved = pxi.open(SMALL), pxi.open(SMALL).layers["disc"].moved(1, 0)
+    assert image.layers == image.layers == pxi.open(SMALL).layers
+    assert hash(image.layers) == hash(pxi.open(SMALL).layers)
+    assert image.layers != moved.layers
+    assert pxi.Layer(image, -1) == image.layers[-1]
+    with pytest.raises(pxi.UsageError):
+        pxi.Layer(image, 3)
+
+
+def test_no_operation_is_no_other_image():
+    image = pxi.open(SMALL)
+    assert image.edited() is image
+
+
+def test_pictures_whose_layers_were_replaced_by_hand_are_saved(made_up_planes):
+    picture = pyramids.cut_picture().picture
+    fewer = pxi.Image(replace(picture, layers=Layers(picture.layers[:-1]), info=None))
+    assert [v.name for v in pxi.from_bytes(fewer.to_bytes()).layers] == [
+        v.name for v in picture.layers[:-1]
+    ]

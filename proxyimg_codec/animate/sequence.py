@@ -57,7 +57,7 @@ def frames(
     Yields:
         uint8 [H, W, 3 or 4] frame for each time.
     """
-    cache = Cache()
+    cache = getattr(image, "cache", None) or Cache()
 
     def frame(t: float) -> NDArray[np.uint8]:
         return np.asarray(render(image, t=t, cache=cache, **options))

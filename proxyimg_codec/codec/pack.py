@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from ..container import meta, texr
@@ -11,13 +12,16 @@ from ..container.fields import pack as packed
 from ..geometry import boundary as boundaries
 from ..geometry import pose as poses
 from ..geometry import track as tracks
-from ..model import Picture
+from ..model import Layers, Picture
+from ..render.neighbours import settled
 from ..texture.implicit import ImplicitTexture
 from ..texture.planes import Planes
 
 
 def pack(picture: Picture) -> Container:
     """Packs a picture to the fields of all its chunks."""
+    # Edits have done so; a picture whose layers were replaced by hand may name cuts that are gone.
+    picture = replace(picture, layers=Layers(settled(picture.layers)))
     meshes = [(i, v.mesh) for i, v in enumerate(picture.layers) if v.mesh is not None]
     posed = [(i, v) for i, v in enumerate(picture.layers) if not v.pose.at_rest]
     return Container(

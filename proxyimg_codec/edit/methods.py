@@ -17,6 +17,8 @@ class Editable(Generic[Edited]):
     that have this one as parent follow its geometry.
     """
 
+    __slots__ = ()
+
     def _edited(self, op: str, **values: Any) -> Edited:
         """Image after operation `op` on this layer; values that are None are left out."""
         raise NotImplementedError  # only subclasses know the picture of the layer

@@ -9,10 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import cv2
 import numpy as np
 
+from .. import plugins
 from ..errors import InputError
 from ..geometry.pose import OPACITY_MAX, Pose
 from ..io.samples import to_float
@@ -37,7 +39,7 @@ SURE = 0.5
 
 def encode_layers(
     picture: LayeredPicture, settings: Settings | None = None, progress: Progress | None = None
-) -> tuple[Picture, LayeredPicture]:
+) -> tuple[Any, LayeredPicture]:
     """Encodes a layered picture with implicit textures, layer by layer.
 
     Opacity, visibility and groups of the layers are kept, and so are the metadata blocks.
@@ -48,7 +50,7 @@ def encode_layers(
         progress: Called with the name of a stage, and its numbers of units done and in all.
 
     Returns:
-        The picture as a reader will decode it, and `picture` without the layers that were left out
+        The `Image` as a reader will decode it, and `picture` without the layers that were left out
         because they have too few or too faint pixels.
 
     Raises:
@@ -57,6 +59,14 @@ def encode_layers(
         UnsupportedError: A package that is needed is not installed.
         LimitError: The canvas is larger than readers accept by default.
     """
+    found, kept = encode_layered(picture, settings, progress)
+    return plugins.find("handles", "image")(found), kept
+
+
+def encode_layered(
+    picture: LayeredPicture, settings: Settings | None = None, progress: Progress | None = None
+) -> tuple[Picture, LayeredPicture]:
+    """Encodes a layered picture as `encode_layers` does, and returns it as data."""
     settings = settings or Settings()
     report = progress or (lambda stage, done, total: None)
     DEFAULT_LIMITS.check("side", max(picture.width, picture.height))

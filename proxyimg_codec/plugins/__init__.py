@@ -9,6 +9,7 @@ Kinds:
     segmenters: `(rgb, max_layers, support) -> list[Region]`, as `encoder.shapes.segment.segment`.
     meshers: `(boundary, size, edge) -> Base`, as `geometry.mesher.delaunay`.
     engines: `(texture, network, taps) -> float32 [N, channels]`, as `render.engines.run_numpy`.
+    handles: `(picture) -> Image`: what functions below `api` give to those who call them directly.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ BUILT_IN = {
         "ftetwild": "proxyimg_codec.encoder.shapes.external_meshers:ftetwild",
     },
     "engines": {"ort": "proxyimg_codec.export.onnx_engine:run"},
+    "handles": {"image": "proxyimg_codec.api:Image"},
 }
 """Plug-ins of this package: ``module:attribute`` by kind and name."""
 

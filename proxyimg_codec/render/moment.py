@@ -30,3 +30,12 @@ def at(picture: Picture, t: float) -> Picture:
         return replace(layer, pose=pose, track=None)
 
     return replace(picture, layers=Layers(map(still, picture.layers)), timeline=None, history=())
+
+
+def displacements(picture: Picture) -> list[tuple[bytes, int | None] | None]:
+    """For each layer its displacements at a moment of a timeline, and its body, or None.
+
+    No file holds them.
+    """
+    poses = (layer.pose for layer in picture.layers)
+    return [None if v.sway is None else (v.sway.tobytes(), v.body) for v in poses]

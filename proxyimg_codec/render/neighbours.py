@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from weakref import WeakKeyDictionary
 
 from ..geometry.boundary import Boundary
 from ..geometry.pose import Pose
@@ -18,17 +19,30 @@ from ..model import Layer, Picture
 from ..texture.occlusion import ALL_IN_PLACE, Moved
 from ..texture.pyramid import PyramidTexture, Texture
 
+Size = tuple[int, int]
+
+
+_OUTLINES: WeakKeyDictionary[Layer, tuple[Size, Boundary | None]] = WeakKeyDictionary()
+_MOVED: WeakKeyDictionary[Picture, dict[Layer, Moved]] = WeakKeyDictionary()
+
 
 def present_outline(picture: Picture, layer: Layer) -> Boundary | None:
     """Boundary of a layer of `picture` in its present place; None for the whole canvas."""
-    return outline(layer.boundary, layer.pose, layer.mesh, picture.size)
+    known = _OUTLINES.get(layer)
+    if known is None or known[0] != picture.size:
+        found = outline(layer.boundary, layer.pose, layer.mesh, picture.size)
+        known = _OUTLINES[layer] = (picture.size, found)
+    return known[1]
 
 
 def moved_neighbours(picture: Picture, layer: Layer) -> Moved:
     """Finds what has moved relative to a layer since its view was cut; see `Moved`."""
-    layers = picture.layers
-    home = next(k for k, v in enumerate(layers) if v.texture is layer.texture)
-    return _moved(layer.texture, layer.pose, layers, home)
+    known = _MOVED.setdefault(picture, {})
+    if layer not in known:
+        layers = picture.layers
+        home = next(k for k, v in enumerate(layers) if v.texture is layer.texture)
+        known[layer] = _moved(layer.texture, layer.pose, layers, home)
+    return known[layer]
 
 
 def _moved(view: Texture, pose: Pose, layers: Sequence[Layer], home: int) -> Moved:
