@@ -74,7 +74,10 @@ def test_commands_run(page, folder):
         run([*tool("pxi-encode"), "photo.png", "--preset", "fast"], folder)
     for words in commands(page):
         force = words[0] in ("pxi-encode", "pxi-edit", "pxi-animate") and "--force" not in words
-        run([*tool(words[0]), *words[1:], *(["--force"] if force else [])], folder)
+        # Those of the README run as they are; for the others it is no matter how hard it tries.
+        quick = words[0] == "pxi-encode" and page != "README.md" and "-e" not in words
+        more = [*(["--force"] if force else []), *(["-e", "1"] if quick else [])]
+        run([*tool(words[0]), *words[1:], *more], folder)
 
 
 def tool(name):
