@@ -40,7 +40,7 @@ test: .venv/ready tests/web/node_modules/ready
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache --no-logo
-	$(BIN)/pytest
+	$(BIN)/pytest -n auto --dist loadfile
 
 # The documentation in site/, without a network. Warnings and links that lead nowhere are errors, unless
 # --quiet hides them.
