@@ -18,7 +18,8 @@ from fuzz import run
 with run.imports(__name__):
     from proxyimg_codec import from_bytes
     from proxyimg_codec.api import Image
-    from proxyimg_codec.edit.operations import KINDS, OPERATIONS
+    from proxyimg_codec.edit.operations import KINDS
+    from proxyimg_codec.edit.script import OPERATIONS
     from proxyimg_codec.errors import PxiError
 
 PICTURES = (

@@ -1,4 +1,6 @@
 import json
+import subprocess
+import sys
 
 import pytest
 
@@ -35,3 +37,8 @@ def test_the_schema_refuses_what_has_the_wrong_shape(validator):
         if values.get("by", [0])[-1] == values.get("by", [0])[-1]:  # JSON has no NaN
             assert not validator.is_valid({"version": 1, "edits": [values]})
     assert not validator.is_valid({"edits": []})
+
+
+def test_the_fuzz_target_knows_the_operations():
+    code = "from fuzz import edit; assert len(edit.OPERATIONS) > 20"
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True, timeout=60)
