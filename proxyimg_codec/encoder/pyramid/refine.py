@@ -31,7 +31,7 @@ class Target(NamedTuple):
     """Target of refinement: pictures that latents should show, and restrictions on the latents.
 
     Attributes:
-        picture: [B, 3, H, W] pictures in 0..255; H and W are multiples of 2**levels.
+        picture: [B, 3, H, W] pictures in 0..255.
         weight: [B, 1, H, W] weights of the squared errors of samples; None = 1.
         support: For each level a float mask [1, 9, h, w], 0 for latents that must be 0, else 1;
             None = all 1.
@@ -129,7 +129,7 @@ def cost(model: Model, target: Target, latents: Sequence[Tensor], smooth: bool =
     for y, p, mask in zip(latents, likely, masks, strict=False):
         own = count(y, *p)
         spent = spent + (own if mask is None else own * mask).sum((1, 2, 3))
-    shown = model.synthesise(list(latents), target.step)
+    shown = model.synthesise(list(latents), target.step, target.picture.shape[2:])
     if target.similarity is not None:
         weight = 1.0 if target.weight is None else target.weight
         alike = ms_ssim(shown * weight, target.picture * weight)
