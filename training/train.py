@@ -171,7 +171,11 @@ def analysed(model: Model, pictures: list[Pixels], state: dict[str, Any], args: 
         latents = [y + (torch.round(y) - y).detach() for y in model.analyse(x, step)]
         likely = model.likelihoods(latents, step)
         pixels = x.shape[2] * x.shape[3]
-        distortion = ((model.synthesise(latents, step) - x) ** 2).sum((1, 2, 3)) / step**2 / pixels
+        distortion = (
+            ((model.synthesise(latents, step, x.shape[2:]) - x) ** 2).sum((1, 2, 3))
+            / step**2
+            / pixels
+        )
         coded = zip(latents, likely, strict=False)
         spent = torch.zeros(BATCH)
         for y, p in coded:

@@ -84,7 +84,7 @@ class Grid(NamedTuple):
 
 
 def by_channel(bands: Bands) -> NDArray[np.bool_]:
-    """Spreads the bits of `bands` [h, w] over the nine channels 3 * colour + band, bool [9, h, w]."""
+    """Spreads the bits of `bands` [h, w] over the channels 3 * colour + band, bool [9, h, w]."""
     channel = np.arange(9).reshape(9, 1, 1)
     return (bands >> channel % 3 & 1).astype(bool)
 

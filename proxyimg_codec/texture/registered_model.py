@@ -24,7 +24,6 @@ LEVEL_SETS = 4
 """Number of sets of weights: for levels 1, 2, 3, and for all coarser levels."""
 
 
-
 class Registration(NamedTuple):
     """Entry of the registry of models.
 

@@ -49,9 +49,7 @@ def _planes(colour: int) -> list[tuple[int, tuple[int, int]]]:
     return [(3 + 3 * band + colour, way) for band, way in enumerate(BANDS)]
 
 
-def samples(
-    model: Model, grid: Grid, latents: Sequence[Ints], lowest: Ints, step: int
-) -> Floats:
+def samples(model: Model, grid: Grid, latents: Sequence[Ints], lowest: Ints, step: int) -> Floats:
     """Computes the samples of a raster from its latents.
 
     Args:
