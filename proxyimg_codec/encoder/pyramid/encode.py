@@ -126,7 +126,8 @@ class _Job:
     Attributes:
         picture: [1, 3, rows, columns] samples.
         weight: [1, 1, rows, columns] weights; None = 1.
-        support: For each level a mask [1, 9, h, w], 0 for latents that must be 0; None = all 1.
+        support: For each level, then for the lowest planes, a mask [1, channels, h, w], 0 for
+            latents that must be 0; None = all 1.
         latents: Latents of levels 1, 2, ..., then the lowest planes.
         shifts: Shifts of the scale index.
         count: Number of levels.
@@ -153,7 +154,9 @@ class _Job:
             mask = by_channel(Grid(r.size, self.count).bands(cells, CELL, level))
             mask[3:] &= not r.grey
             masks.append(_tensor(mask.astype(np.float32)))
-        return masks
+        lowest = np.ones((3, *mask.shape[1:]), np.float32)
+        lowest[1:] *= not r.grey
+        return [*masks, _tensor(lowest)]
 
     @torch.no_grad()
     def _analysed(self) -> list[Tensor]:
@@ -166,11 +169,9 @@ class _Job:
             part = self.picture[:, :, box.outer[0], box.outer[1]]
             own = refine.shrunk(self.model.analyse(part, self.step, self.count), refine.DEAD_ZONE)
             self._keep(box, found, own)
-        if self.raster.grey:
-            found[-1][:, 1:] = 0
-        if self.support is not None:
-            found[:-1] = [y * mask for y, mask in zip(found[:-1], self.support, strict=True)]
-        return found
+        if self.support is None:
+            return found
+        return [y * mask for y, mask in zip(found, self.support, strict=True)]
 
     def _depths(self) -> list[int]:
         """Level of each array of latents; the lowest planes have the size of the last level."""
