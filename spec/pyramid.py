@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from proxyimg_codec.entropy import laplace
 from proxyimg_codec.native import kernel
 from proxyimg_codec.texture import planes, registered_model
-from proxyimg_codec.texture.latents import Decoder, Latents, support_at
+from proxyimg_codec.texture.grid import Grid, by_channel
+from proxyimg_codec.texture.latents import Decoder, Latents
 
 from .dump import grid
 
@@ -39,26 +40,31 @@ def _listed(name: str, values: list[int], a_line: int = 8) -> Iterator[str]:
     yield "]  # fmt: skip"
 
 
-def _file(number: int) -> bytes:
+def _file(name: str) -> bytes:
     """Bytes of the file of a registered model."""
-    return resources.files("proxyimg_codec.models").joinpath(f"pyramid-{number}.bin").read_bytes()
+    return resources.files("proxyimg_codec.models").joinpath(f"{name}.bin").read_bytes()
 
 
 def models() -> Iterator[str]:
     """Yields the rows of the table of registered models."""
-    yield "| Number | File | Bytes | H | C |"
-    yield "|---|---|---|---|---|"
-    for number in registered_model.REGISTERED:
-        data = _file(number)
+    yield "| Number | File | Bytes | H | C | Planes |"
+    yield "|---|---|---|---|---|---|"
+    for number, entry in registered_model.REGISTERED.items():
+        data = _file(entry.file)
         hidden, context = struct.unpack_from("<HH", data, len(registered_model.MAGIC))
-        yield f"| {number} | `pyramid-{number}.bin` | {len(data)} | {hidden} | {context} |"
+        planes_ = "padded" if entry.padded else "not padded"
+        yield f"| {number} | `{entry.file}.bin` | {len(data)} | {hidden} | {context} | {planes_} |"
 
 
 def registered() -> Iterator[str]:
-    """Yields lines of Python with the SHA-256 of each model."""
+    """Yields lines of Python with the file of each model, its SHA-256, and whether it is padded."""
+    entries = registered_model.REGISTERED
+    names = {v.digest: f"NETWORKS_{k}" for k, v in reversed(entries.items())}
+    for digest, name in names.items():
+        yield f'{name} = "{digest}"'
     yield "REGISTERED = {"
-    for number, digest in registered_model.REGISTERED.items():
-        yield f'    {number}: "{digest}",'
+    for number, entry in entries.items():
+        yield f'    {number}: ("{entry.file}.bin", {names[entry.digest]}, {entry.padded}),'
     yield "}"
 
 
@@ -107,9 +113,10 @@ def example() -> Iterator[str]:
     for colour, plane in enumerate(lowest):
         yield f"lowest plane of colour {colour}"
         yield from grid(plane)
+    coded = by_channel(Grid((5, 3), 1).bands(_cells(), 1, 1))
     for channel in _HIGH:
         yield f"level 1, channel {channel}"
-        yield from grid(levels[0][channel], support_at(_cells(), 1, (5, 3), 1, 1))
+        yield from grid(levels[0][channel], coded[channel])
     for k, name in enumerate(("red", "green", "blue")):
         yield f"{name}, in 8 bits"
         yield from grid(np.rint(shown.raster[..., k] * 255).astype(int))

@@ -66,7 +66,10 @@ CODERS = {texr.SHARED: "shared", texr.IMPLICIT: "implicit", texr.PYRAMID: "pyram
 
 def _numbers() -> dict[str, dict[int, str]]:
     """Fields whose numbers later versions may add to, with the meanings of the numbers."""
-    models = {number: f"pyramid-{number}.bin" for number in registered_model.REGISTERED}
+    models = {
+        number: f"{entry.file}.bin, {'padded' if entry.padded else 'not padded'}"
+        for number, entry in registered_model.REGISTERED.items()
+    }
     return {"coder of TEXR": CODERS, "sampling of LAYR": SAMPLINGS, "model of PLAN": models}
 
 
@@ -125,7 +128,7 @@ def as_json(fields: Mapping[str, Sequence[Field]], ids: Sequence[str]) -> str:
         "numbers": {
             field: {str(k): v for k, v in known.items()} for field, known in _numbers().items()
         },
-        "models": {str(k): digest for k, digest in registered_model.REGISTERED.items()},
+        "models": {str(k): v.digest for k, v in registered_model.REGISTERED.items()},
         "limits": asdict(DEFAULT_LIMITS),
         "profiles": list(levels.PROFILES),
         "levels": [{n: getattr(v, n) for n in levels.COUNTED} for v in levels.LEVELS],

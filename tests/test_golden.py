@@ -26,7 +26,16 @@ def test_old_files_decode_as_ever(file):
 
 
 @pytest.mark.parametrize(
-    "name", ["0.1/alpha", "0.2/all-displaced", "0.2/edited", "0.3/edited", "0.3/moves-loop"]
+    "name",
+    [
+        "0.1/alpha",
+        "0.2/all-displaced",
+        "0.2/edited",
+        "0.3/edited",
+        "0.3/moves-loop",
+        "0.9/edited",
+        "0.9/moves-loop",
+    ],
 )
 def test_old_files_are_saved_as_new_ones_with_the_same_pixels(name):
     image = from_bytes((GOLDEN / f"{name}.pxi").read_bytes())
@@ -38,7 +47,12 @@ def test_old_files_are_saved_as_new_ones_with_the_same_pixels(name):
 
 
 @pytest.mark.parametrize(
-    ("edited", "edits", "start"), [("0.2/edited", 6, "0.1/layers"), ("0.3/edited", 3, "0.3/start")]
+    ("edited", "edits", "start"),
+    [
+        ("0.2/edited", 6, "0.1/layers"),
+        ("0.3/edited", 3, "0.3/start"),
+        ("0.9/edited", 2, "0.9/start"),
+    ],
 )
 def test_old_histories_lead_back(edited, edits, start):
     """The edits of these files, made by earlier versions, began with others."""

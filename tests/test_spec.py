@@ -20,6 +20,7 @@ from proxyimg_codec.geometry.pose import REST, Pose
 from proxyimg_codec.limits import Limits
 from proxyimg_codec.model import Layer, Layers
 from proxyimg_codec.texture import context, diffusion, planes, pyramid, registered_model
+from proxyimg_codec.texture.grid import Grid
 from proxyimg_codec.texture.implicit import ImplicitTexture
 from proxyimg_codec.texture.latents import Latents
 from proxyimg_codec.texture.network import NetShape, Network
@@ -434,16 +435,16 @@ def test_program_has_the_distributions_of_the_package(program):
         assert (ends[len(found) :] == 1 << 14).all()
 
 
-def random_planes(rng, size, levels, components, spread):
+def random_planes(rng, size, levels, components, spread, model):
     """Planes of random latents, with holes, shifts and escapes."""
-    columns, rows = (-(-n >> levels) for n in size)
+    grid = Grid(size, levels, registered_model.registration(model).padded)
     found = []
     for level in range(levels):
-        shape = 9, rows << (levels - 1 - level), columns << (levels - 1 - level)
+        shape = 9, *grid.at(level + 1)
         values = np.rint(rng.laplace(0, spread, shape)) * (rng.random(shape) < 0.5)
         values[3:] *= components == 3 and (level > 0 or spread < 100)
         found.append(np.clip(values, -65535, 65535).astype(np.int32))
-    lowest = np.rint(rng.normal(0, 40, (3, rows, columns))).astype(np.int32)
+    lowest = np.rint(rng.normal(0, 40, (3, *grid.at(levels)))).astype(np.int32)
     lowest[1:] *= components == 3
     cell = int(rng.integers(1, 4))
     cells = rng.random(planes.cells_of(size, cell)) < 0.7
@@ -451,15 +452,16 @@ def random_planes(rng, size, levels, components, spread):
     shifts = tuple(rng.integers(-8, 8, 2 * levels).tolist())
     step = int(rng.integers(0, 641))
     latents = Latents(tuple(found), lowest)
-    return planes.encoded(latents, size, step, cells, cell, components, 1, shifts)
+    return planes.encoded(latents, size, step, cells, cell, components, model, shifts)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(9))
 def test_program_decodes_planes(program, seed):
     rng = np.random.default_rng(seed)
     size = tuple(rng.integers(1, 14, 2).tolist())
     spread = (0.5, 8, 9000)[seed % 3]
-    made = random_planes(rng, size, 1 + seed % 4, 1 if seed == 4 else 3, spread)
+    components, model = 1 if seed == 4 else 3, 1 if seed > 5 else 2
+    made = random_planes(rng, size, 1 + seed % 4, components, spread, model)
     fields = dict(made.packed)
     lowest, levels = program["decode_planes"](fields)
     want = planes.unpack(fields)

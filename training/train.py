@@ -171,7 +171,11 @@ def analysed(model: Model, pictures: list[Pixels], state: dict[str, Any], args: 
         latents = [y + (torch.round(y) - y).detach() for y in model.analyse(x, step)]
         likely = model.likelihoods(latents, step)
         pixels = x.shape[2] * x.shape[3]
-        distortion = ((model.synthesise(latents, step) - x) ** 2).sum((1, 2, 3)) / step**2 / pixels
+        distortion = (
+            ((model.synthesise(latents, step, x.shape[2:]) - x) ** 2).sum((1, 2, 3))
+            / step**2
+            / pixels
+        )
         coded = zip(latents, likely, strict=False)
         spent = torch.zeros(BATCH)
         for y, p in coded:
@@ -202,7 +206,8 @@ def refined(model: Model, pictures: list[Pixels], state: dict[str, Any], args: A
             opt.zero_grad(set_to_none=True)
             spent.total.backward()  # type: ignore[no-untyped-call]
             slopes = [y.grad for y in ys if y.grad is not None]
-            now = moved(model, step, [y.detach() for y in ys], spent.likely, slopes, random)
+            ys = [y.detach() for y in ys]
+            now = moved(model, step, ys, spent.likely, slopes, random, settle=turn == 0)
             if turn > 0:  # latents of the first round are not refined, unlike those of a file
                 journal.set_rates()
                 torch.nn.utils.clip_grad_norm_(kept, 2e5)

@@ -190,7 +190,7 @@ FAULTS: dict[str, list[Patch]] = {
     "accepts-more-values": [(file, "unpack", _ignoring_more)],
     "accepts-any-order-of-keys": [(file, "unpack", _sorting_keys)],
     "refuses-maps": [(file, "unpack", _refusing_maps)],
-    "reads-maps-in-all-versions": [(chunks, "MAPS_UNTIL", (0, 9))],
+    "reads-maps-in-all-versions": [(chunks, "MAPS_UNTIL", (0, 99))],
     "exit-code-1": [(decode, "main", _crashing)],
     "exit-code-0": [(decode, "main", _obliging)],
     "hangs": [(decode, "main", _hanging)],

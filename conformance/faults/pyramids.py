@@ -14,6 +14,7 @@ from proxyimg_codec.native import kernel
 from proxyimg_codec.render import compose
 from proxyimg_codec.texture import (
     context,
+    grid,
     latents,
     occlusion,
     pyramid,
@@ -21,6 +22,7 @@ from proxyimg_codec.texture import (
     synthesis,
 )
 from proxyimg_codec.texture.context import LevelCoder
+from proxyimg_codec.texture.grid import Grid
 from proxyimg_codec.texture.occlusion import ALL_IN_PLACE, ALL_REMOVED, Moved, Occlusion
 from proxyimg_codec.texture.pyramid import PyramidTexture
 
@@ -37,16 +39,18 @@ def _truncated(numerator: Any, unit: int) -> Any:
     return np.sign(numerator) * (128 * size // (4 * unit + size))
 
 
-def _chroma_first(self: LevelCoder, coder: Any, ahead: Any, around: Any, given: Any) -> Any:
+def _chroma_first(
+    self: LevelCoder, coder: Any, ahead: Any, around: Any, there: Any, given: Any
+) -> Any:
     if self.grey:
-        return wave_of(self, coder, ahead, around, given)
+        return wave_of(self, coder, ahead, around, there, given)
     w = self.weights
     z = context.scaled(around @ self._causal, -w.causal.exponent - 3)
     z = context.activated(z + ahead, 3)
     z = context.activated(z @ self._mix + context._floats(w.mix_bias), -w.mix.exponent)
     out = np.zeros((len(z), 9), np.int64)
-    self._put(coder, z @ self._chroma, w.chroma, w.chroma_bias, 1, given, out[:, 3:])
-    self._put(coder, z @ self._luma, w.luma, w.luma_bias, 0, given, out[:, :3])
+    self._put(coder, z @ self._chroma, w.chroma, w.chroma_bias, 1, there, given, out[:, 3:])
+    self._put(coder, z @ self._luma, w.luma, w.luma_bias, 0, there, given, out[:, :3])
     return out
 
 
@@ -63,16 +67,25 @@ def _waves(slope: int) -> Any:
     return waves
 
 
-def _everywhere(*args: Any) -> Any:
-    return np.ones_like(support_of(*args))
+def _everywhere(self: Grid, cells: Any, cell: int, level: int) -> Any:
+    return bands_of(self, np.ones_like(cells), cell, level)
 
 
-def _clipped(n: int, by: int, high: bool) -> Any:
-    return np.clip(np.arange(n) + by, 0, n - 1)
+def _odd_as_even(self: Grid, cells: Any, cell: int, level: int) -> Any:
+    return np.where(bands_of(self, cells, cell, level), np.uint8(7), np.uint8(0))
 
 
-def _low_everywhere(n: int, by: int, high: bool) -> Any:
-    return shifted_of(n, by, False)
+def _clipped(size: int, high: bool) -> Any:
+    n = (size + 1) // 2
+    return np.clip(np.arange(-2, n + 2), 0, n - 1)
+
+
+def _low_everywhere(size: int, high: bool) -> Any:
+    return np.minimum(mirrored_of(size, False), max((size - int(high) - 1) // 2, 0))
+
+
+def _mirrored_as_even(size: int, high: bool) -> Any:
+    return mirrored_of(size + size % 2, high)
 
 
 def _without_shifts(self: Any, weights: Any, step: int, grey: bool, shifts: Any) -> None:
@@ -158,8 +171,8 @@ def _only_where(self: Pose, other: Pose) -> bool:
     return (self.matrix, self.shift) == (other.matrix, other.shift)
 
 
-support_of, shifted_of, level_of = latents.support_at, context._shifted, LevelCoder.__init__
-wave_of, escape_of = LevelCoder._wave, latents.Decoder._escape
+bands_of, mirrored_of, level_of = Grid.bands, grid.mirrored_indices, LevelCoder.__init__
+grid_of, wave_of, escape_of = Grid.of, LevelCoder._wave, latents.Decoder._escape
 position_of, samples_of = pyramid._position, PyramidTexture._samples
 unpack_of, premultiplied_of = pyramid.unpack, compose.premultiplied
 moved_of = Occlusion.moved
@@ -171,11 +184,18 @@ _FAULTS: dict[str, list[Patch]] = {
     "features-truncated": [(context, "_squashed", _truncated)],
     "chroma-first": [(LevelCoder, "_wave", _chroma_first)],
     "waves-too-steep": [(context, "waves", _waves(4))],
-    "ignores-support": [(latents, "support_at", _everywhere)],
-    "context-not-mirrored": [(context, "_shifted", _clipped)],
-    "context-high-mirrored-as-low": [(context, "_shifted", _low_everywhere)],
-    "synthesis-not-mirrored": [(synthesis, "mirrored_indices", lambda n, high:
-        np.clip(np.arange(-2, n + 2), 0, n - 1))],
+    "ignores-support": [(Grid, "bands", _everywhere)],
+    "codes-bands-that-are-not-there": [(Grid, "bands", _odd_as_even)],
+    "support-of-padded-everywhere": [(grid, "_grown", lambda mask: mask)],
+    "pads-all-models": [(Grid, "of", classmethod(lambda cls, fields: grid_of(fields)
+        ._replace(padded=True)))],
+    "pads-no-model": [(Grid, "of", classmethod(lambda cls, fields: grid_of(fields)
+        ._replace(padded=False)))],
+    "context-not-mirrored": [(context, "mirrored_indices", _clipped)],
+    "context-high-mirrored-as-low": [(context, "mirrored_indices", _low_everywhere)],
+    "context-odd-mirrored-as-even": [(context, "mirrored_indices", _mirrored_as_even)],
+    "synthesis-not-mirrored": [(synthesis, "mirrored_indices", _clipped)],
+    "synthesis-odd-mirrored-as-even": [(synthesis, "mirrored_indices", _mirrored_as_even)],
     "ignores-shifts": [(LevelCoder, "__init__", _without_shifts)],
     "ignores-grey-levels": [(LevelCoder, "__init__", _all_colour)],
     "one-level-set": [(registered_model, "LEVEL_SETS", 1)],

@@ -44,7 +44,6 @@ PEAK, RMS = 0.05, 0.01
 LAST_BITS = 0.01
 """Difference in 8-bit levels that pictures may have from machine to machine."""
 
-PNG = b"\x89PNG"
 
 Made = tuple[bytes, dict[str, Any]]
 """Input and description of a case."""
@@ -195,28 +194,24 @@ def _write(folder: Path) -> None:
         for other in _present(folder) - places:
             shutil.rmtree(folder / other, ignore_errors=True)
         for at in sorted(places):
-            if not _alike(new / at, folder / at):
-                shutil.rmtree(folder / at, ignore_errors=True)
-                (folder / at).parent.mkdir(parents=True, exist_ok=True)
-                (new / at).rename(folder / at)
+            _keep(folder / at, new / at)
+            shutil.rmtree(folder / at, ignore_errors=True)
+            (folder / at).parent.mkdir(parents=True, exist_ok=True)
+            (new / at).rename(folder / at)
     for kind in folder.iterdir():
         if not any(kind.iterdir()):
             kind.rmdir()
 
 
-def _alike(one: Path, other: Path) -> bool:
-    """Whether two folders have the same files, but for the last bits of pictures."""
-    if not other.is_dir() or {f.name for f in one.iterdir()} != {f.name for f in other.iterdir()}:
-        return False
-    return all(_same(f.read_bytes(), (other / f.name).read_bytes()) for f in one.iterdir())
+def _keep(old: Path, new: Path) -> None:
+    """Takes pictures of a case as they were, if they differ in the last bits only."""
+    for file in old.glob("*.png"):
+        if (new / file.name).exists() and _same(file.read_bytes(), (new / file.name).read_bytes()):
+            file.replace(new / file.name)
 
 
 def _same(one: bytes, other: bytes) -> bool:
-    """Whether two files are equal, or pictures that differ as they do between machines."""
-    if one == other:
-        return True
-    if not one.startswith(PNG) or not other.startswith(PNG):
-        return False
+    """Whether two pictures are equal, but for differences as there are between machines."""
     first, second = pixels.read(one), pixels.read(other)
     return first.shape == second.shape and judge.difference(first, second)[0] <= LAST_BITS
 

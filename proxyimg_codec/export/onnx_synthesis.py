@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..texture import registered_model
+from ..texture.grid import BANDS, Grid, mirrored_indices
 from ..texture.latents import Latents
 from ..texture.network import Floats
 from ..texture.planes import Planes
-from ..texture.synthesis import BANDS, mirrored_indices, wavelet
+from ..texture.synthesis import wavelet
 from .onnx_graph import Graph, Value
 
 if TYPE_CHECKING:
@@ -21,9 +22,9 @@ Synthesis of a pyramid texture, for planes of the size and step of one file. Inp
 numbers as decoded from the file, [1, channel, row, column]. `lowest` has the lowest planes of three
 colours, 0 for luma, 1 and 2 for chroma. `level_k` has the latents of level k, 1 being the finest:
 channel 3 * colour + band, band 0 is high-pass across, 1 high-pass down, 2 both. Its rows and
-columns are those of the raster, padded to a multiple of 2 ** levels, over 2 ** k. `samples`
-[1, row, column, component] is the raster without padding, row 0 on top: red, green and blue, or
-grey alone, straight, in 0..1."""
+columns are those of the raster over 2 ** k, rounded up (in model 1 those of the raster padded to a
+multiple of 2 ** levels). `samples` [1, row, column, component] is the raster without padding, row 0
+on top: red, green and blue, or grey alone, straight, in 0..1."""
 
 
 def feed(latents: Latents) -> dict[str, Floats]:
@@ -40,23 +41,21 @@ def build(planes: Planes) -> onnx.ModelProto:
     """Builds the model: `lowest` [1, 3, h, w] and `level_k` [1, 9, h', w'] -> `samples`.
 
     All are float32. `samples` [1, rows, columns, components] in 0..1 are those of `Planes.raster`.
-    Shapes are fixed: of L levels, level k has ceil(rows / 2**L) 2**(L - k) rows, and columns
-    likewise; the lowest planes have those of level L. Step and weights are initializers; there is
-    no external data. The latents are not part of the model.
+    Shapes are fixed: those of `Grid.at` for each level; the lowest planes have that of the coarsest
+    level. Step and weights are initializers; there is no external data. The latents are not part of
+    the model.
 
     Raises:
         UnsupportedError: onnx is not installed, or the model number of the planes is unknown.
     """
     graph = Graph()
     weights = registered_model.registered(planes.packed["model"])
-    levels, step, (columns, rows) = planes.packed["levels"], planes.packed["step"], planes.size
-    h, w = (-(-n >> levels) for n in (rows, columns))
-    low = graph.input("lowest", np.float32, (1, 3, h, w))
-    for level in range(levels, 0, -1):
-        high = graph.input(f"level_{level}", np.float32, (1, 9, h, w))
+    grid, step, (columns, rows) = Grid.of(planes.packed), planes.packed["step"], planes.size
+    low = graph.input("lowest", np.float32, (1, 3, *grid.at(grid.levels)))
+    for level in range(grid.levels, 0, -1):
+        high = graph.input(f"level_{level}", np.float32, (1, 9, *grid.at(level)))
         net = weights.synthesis[min(level, len(weights.synthesis)) - 1]
-        low = _finer(net, step, low, high, (h, w))
-        h, w = 2 * h, 2 * w
+        low = _finer(net, step, low, high, grid.at(level - 1))
     samples = _coloured(weights, planes, low)
     shape = 1, rows, columns, planes.components
     return graph.model("proxyimg_synthesis", [(samples, shape)], DOCUMENTATION)
@@ -65,7 +64,7 @@ def build(planes: Planes) -> onnx.ModelProto:
 def _finer(
     net: registered_model.Synthesis, step: int, low: Value, latents: Value, shape: tuple[int, int]
 ) -> Value:
-    """Next finer planes [1, 3, 2h, 2w], as in `texture.synthesis`."""
+    """Next finer planes [1, 3, *shape], as in `texture.synthesis`."""
     graph = low.graph
     t = np.float32((step - registered_model.STEP_ORIGIN) / 128)
     gain = np.exp(net.gain.floats + net.gain_by_step.floats * t).reshape(1, 9, 1, 1)
@@ -81,7 +80,8 @@ def _finer(
     z = graph.op("Conv", z, net.third.floats, net.third_bias.floats, pads=[1] * 4)
     linear = (wavelet() + net.delta.floats).astype(np.float32)
     straight = graph.op("Conv", _extended(low, high, shape), linear)
-    return graph.op("DepthToSpace", straight + z, blocksize=2, mode="CRD")
+    cells = graph.op("DepthToSpace", straight + z, blocksize=2, mode="CRD")
+    return graph.op("Slice", cells, np.array([0, 0]), np.array(shape), np.array([2, 3]))
 
 
 def _extended(low: Value, high: Value, shape: tuple[int, int]) -> Value:

@@ -20,7 +20,7 @@ struct Level {
     int64_t n_logs;
     const int32_t *low;      // [3][height][width]
     const int32_t *parent;   // [9][(height + 1) / 2][(width + 1) / 2]
-    const uint8_t *support;  // [height][width]
+    const uint8_t *bands;    // [height][width], bit b set where band b is coded
     const int32_t *given;    // [9][height][width] to encode, or null to decode
     int32_t *latents;        // [9][height][width], 0
 };
@@ -181,8 +181,10 @@ class LevelCoder {
                 const int32_t *out = outputs.data() + (int64_t)i * stride + c;
                 const int mean = (out[0] + (1 << bits >> 1)) >> bits;
                 const int scale = ((out[count] + (1 << bits)) >> (bits + 1)) + 32 + shift;
-                symbols.push_back(coder.located(std::clamp(mean, -(1 << 14), 1 << 14),
-                                                std::clamp(scale, 0, s.tables.scales - 1)));
+                // Scale and mean 0 make a latent certain: bands that are not there have no symbols.
+                const int there = s.bands[index(i)] >> c % 3 & 1;
+                symbols.push_back(coder.located(there * std::clamp(mean, -(1 << 14), 1 << 14),
+                                                there * std::clamp(scale, 0, s.tables.scales - 1)));
                 if (s.given) symbols.back().value = s.given[(from + c) * size + index(i)];
             }
         if (s.given)
@@ -236,7 +238,7 @@ class LevelCoder {
         for (at = 0; at < w + 3 * (h - 1); at++) {
             ys.clear();
             for (int y = std::max((at - w + 3) / 3, 0); y <= std::min(at / 3, h - 1); y++)
-                if (s.support[(int64_t)y * w + at - 3 * y]) ys.push_back(y);
+                if (s.bands[(int64_t)y * w + at - 3 * y]) ys.push_back(y);
             if (!ys.empty())
                 if (const Wrong wrong = wave()) return wrong;
         }

@@ -5,10 +5,10 @@
 
 struct Synthesis {  // of one level: weights [out][in].., as in texture/registered_model.py
     const float *linear, *first, *first_bias, *second, *second_bias, *third, *third_bias, *gain;
-    int32_t hidden, height, width;
-    const float *low;        // [height][width][3]
-    const int32_t *latents;  // [9][height][width]
-    float *out;              // [2 height][2 width][3]
+    int32_t hidden, height, width, rows, columns;  // rows is 2 height or 2 height - 1, and so on
+    const float *low;                              // [height][width][3]
+    const int32_t *latents;                        // [9][height][width]
+    float *out;                                    // [rows][columns][3]
 };
 
 class Synthesizer {
@@ -30,11 +30,12 @@ class Synthesizer {
     }
     static float soft(float x) { return x / (1 + std::abs(x) * .125f); }
 
-    // -2 .. n + 1 mirrored: low bands about the first sample and behind the last, high reversed.
-    static int mirrored(int i, int n, bool high) {
+    // Index into a band of a line of `size` samples, mirrored about the first and the last of them.
+    static int mirrored(int i, int size, bool high) {
+        const int count = (size + 1 - high) / 2;
         if (i < 0) i = -i - high;
-        if (i >= n) i = 2 * n - 1 - high - i;
-        return std::clamp(i, 0, n - 1);
+        if (i >= count) i = size - 1 - high - i;
+        return std::clamp(i, 0, std::max(count - 1, 0));
     }
 
     // A row of inputs.
@@ -60,14 +61,15 @@ class Synthesizer {
 
     // A row of planes: the low bands, then the high ones.
     void read_wide(int y, float *to) const {
-        const float *low = s.low + (int64_t)mirrored(y, h, false) * w * 3;
-        for (int x = -2; x < w + 2; x++) std::memcpy(to + 12 * (x + 2), low + 3 * mirrored(x, w, false), 12);
+        const float *low = s.low + (int64_t)mirrored(y, s.rows, false) * w * 3;
+        for (int x = -2; x < w + 2; x++)
+            std::memcpy(to + 12 * (x + 2), low + 3 * mirrored(x, s.columns, false), 12);
         for (int c = 0; c < 9; c++) {
             const int band = 1 + c % 3, colour = c / 3;
             const bool down = band > 1, across = band & 1;
-            const int32_t *from = s.latents + c * size + (int64_t)mirrored(y, h, down) * w;
+            const int32_t *from = s.latents + c * size + (int64_t)mirrored(y, s.rows, down) * w;
             for (int x = -2; x < w + 2; x++)
-                to[12 * (x + 2) + 3 * band + colour] = (float)from[mirrored(x, w, across)] * s.gain[c];
+                to[12 * (x + 2) + 3 * band + colour] = (float)from[mirrored(x, s.columns, across)] * s.gain[c];
         }
     }
 
@@ -93,12 +95,11 @@ class Synthesizer {
             for (size_t i = 0; i < std::size(v.v); i++) sum.v[i] += v.v[i];
             std::memcpy(to, &sum, sizeof sum);
         });
-        for (int down = 0; down < 2; down++) {
-            float *to = s.out + (int64_t)(2 * y + down) * 2 * w * 3;
-            for (int x = 0; x < w; x++)
-                for (int across = 0; across < 2; across++)
-                    for (int colour = 0; colour < 3; colour++)
-                        *to++ = cells[(int64_t)x * stride + 4 * colour + 2 * down + across];
+        for (int down = 0; down < 2 && 2 * y + down < s.rows; down++) {
+            float *to = s.out + (int64_t)(2 * y + down) * s.columns * 3;
+            for (int x = 0; x < s.columns; x++)
+                for (int colour = 0; colour < 3; colour++)
+                    *to++ = cells[(int64_t)(x / 2) * stride + 4 * colour + 2 * down + x % 2];
         }
     }
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..entropy import laplace
 from .convolution import by_row, convolved, strips
+from .grid import Bands, mirrored_indices
 from .network import Floats
 from .registered_model import CAUSAL, STEP_ORIGIN, Array, Context
 
@@ -73,50 +74,40 @@ def waves(support: NDArray[np.bool_]) -> Iterator[Wave]:
             yield Wave(rows, t - 3 * rows)
 
 
-def next_plain(low: Ints, high: Ints) -> Ints:
+def next_plain(low: Ints, high: Ints, shape: tuple[int, int]) -> Ints:
     """Computes the next finer plane by the plain wavelet, as an input of the context network.
 
     Args:
         low: int32 [3, h, w] in 1/16.
         high: int32 [9, h, w] latents, channel 3 * colour + band. The bands, as (vertical,
             horizontal) with 1 for high pass, are (0, 1), (1, 0), (1, 1).
+        shape: Rows and columns of the finer plane: 2 h or 2 h - 1, and so on.
 
     Returns:
-        int32 [3, 2 h, 2 w] in 1/16, at most `LIMIT` in magnitude.
+        int32 [3, rows, columns] in 1/16, at most `LIMIT` in magnitude.
     """
     bands = high.reshape(3, 3, *high.shape[1:]) << 4
-    left = _lift(low, bands[:, 1], 1)
-    right = _lift(bands[:, 0], bands[:, 2], 1)
+    left = _lift(low, bands[:, 1], 1, shape[0])
+    right = _lift(bands[:, 0], bands[:, 2], 1, shape[0])
     most = LIMIT << 4
-    out = _lift(left, right, 2)
+    out = _lift(left, right, 2, shape[1])
     return np.clip(out, -most, most, out=out)
 
 
-def _lift(low: Ints, high: Ints, axis: int) -> Ints:
-    """Wavelet synthesis along one axis, with sums in 1/256, rounded half up."""
+def _lift(low: Ints, high: Ints, axis: int, size: int) -> Ints:
+    """Wavelet synthesis of `size` samples along one axis, with sums in 1/256, rounded half up."""
     n = low.shape[axis]
+    index = [mirrored_indices(size, way) for way in (False, True)]
     out = []
     for phase in range(2):
         total = np.full(low.shape, 128, np.int32)
-        for plane, taps, is_high in ((low, LOW[phase], False), (high, HIGH[phase], True)):
+        for plane, taps, at in ((low, LOW[phase], index[0]), (high, HIGH[phase], index[1])):
             for tap, weight in enumerate(taps):
                 if weight:
-                    total += np.int32(weight) * plane.take(_shifted(n, tap - 2, is_high), axis)
+                    total += np.int32(weight) * plane.take(at[tap : tap + n], axis)
         out.append(total >> 8)
     shape = (*low.shape[:axis], 2 * n, *low.shape[axis + 1 :])
-    return np.stack(out, axis + 1).reshape(shape)
-
-
-def _shifted(n: int, by: int, high: bool) -> NDArray[np.int64]:
-    """Indices i + by for i = 0..n-1, mirrored at the ends.
-
-    A low band is mirrored about its first sample and behind its last one, a high band before its
-    first sample and about its last one.
-    """
-    index = np.arange(n) + by
-    index = np.where(index < 0, -index - int(high), index)
-    index = np.where(index >= n, 2 * n - 1 - int(high) - index, index)
-    return np.clip(index, 0, n - 1)
+    return np.stack(out, axis + 1).reshape(shape).take(np.arange(size), axis)
 
 
 def _squashed(numerator: NDArray[Any], unit: int) -> NDArray[Any]:
@@ -181,7 +172,7 @@ class LevelCoder:
         self._from, self._chroma = _matrix(w.from_luma.values.T), _matrix(w.chroma.values.T)
 
     def code(
-        self, coder: Coder, low: Ints, parent: Ints, support: NDArray[np.bool_], values: Ints | None
+        self, coder: Coder, low: Ints, parent: Ints, bands: Bands, values: Ints | None
     ) -> Ints:
         """Encodes or decodes a level.
 
@@ -189,32 +180,33 @@ class LevelCoder:
             coder: The entropy coder.
             low: int32 [3, h, w] plain planes in 1/16.
             parent: int32 [9, ceil(h / 2), ceil(w / 2)] latents of the coarser level, or zeros.
-            support: bool [h, w], True at positions that are coded; latents elsewhere are 0.
+            bands: uint8 [h, w], bit b set where band b is coded; other latents are 0.
             values: int32 [9, h, w] latents to encode; None to decode.
 
         Returns:
             int32 [9, h, w] latents.
         """
-        h, w = support.shape
+        h, w = bands.shape
         ahead = self._ahead(low, parent)  # [h * w, C]
         pitch = w + 4
         seen = np.zeros(((h + 2) * pitch, 18), np.int8)
         latents = np.zeros((9, h * w), np.int32)
         source = None if values is None else values.reshape(9, -1)
         offsets = np.array([dy * pitch + dx for dy, dx in CAUSAL])
-        for wave in waves(support):
+        for wave in waves(bands > 0):
             at = wave.rows * w + wave.columns
+            there = (bands.ravel()[at, None] >> np.arange(3) & 1).astype(bool)  # [N, 3]
             place = (wave.rows + 2) * pitch + wave.columns + 2
             around = seen.take(place[:, None] + offsets, 0).reshape(len(at), -1)
             given = None if source is None else source[:, at].T.astype(np.int64)
-            found = self._wave(coder, ahead[at], around.astype(np.float32), given)
+            found = self._wave(coder, ahead[at], around.astype(np.float32), there, given)
             latents[:, at] = found.T
             seen[place, :9] = _squashed(found, 1)
             seen[place, 9:] = log_feature(found)
         return latents.reshape(9, h, w)
 
     def _wave(
-        self, coder: Coder, ahead: NDArray[np.int16], around: Floats,
+        self, coder: Coder, ahead: NDArray[np.int16], around: Floats, there: NDArray[np.bool_],
         given: NDArray[np.int64] | None,
     ) -> NDArray[np.int64]:  # fmt: skip
         """Codes the latents [N, 9] of a wave.
@@ -223,6 +215,7 @@ class LevelCoder:
             coder: The entropy coder.
             ahead: [N, C] part of the hidden layer from coarser levels, in 1/256.
             around: [N, 216] features of the latents coded before.
+            there: [N, 3] whether each band is coded.
             given: [N, 9] latents to encode; None to decode.
         """
         w = self.weights
@@ -231,7 +224,7 @@ class LevelCoder:
         z = activated(z, 3)
         z = activated(z @ self._mix + _floats(w.mix_bias), -w.mix.exponent)
         out = np.zeros((len(z), 9), np.int64)
-        self._put(coder, z @ self._luma, w.luma, w.luma_bias, 0, given, out[:, :3])
+        self._put(coder, z @ self._luma, w.luma, w.luma_bias, 0, there, given, out[:, :3])
         if self.grey:
             return out
         luma = out[:, :3]
@@ -240,12 +233,12 @@ class LevelCoder:
         z *= 8
         z = activated(z + extra, 3)
         rest = None if given is None else given[:, 3:]
-        self._put(coder, z @ self._chroma, w.chroma, w.chroma_bias, 1, rest, out[:, 3:])
+        self._put(coder, z @ self._chroma, w.chroma, w.chroma_bias, 1, there, rest, out[:, 3:])
         return out
 
     def _put(
         self, coder: Coder, total: Floats, weights: Array, bias: Array, kind: int,
-        given: NDArray[np.int64] | None, out: NDArray[np.int64],
+        there: NDArray[np.bool_], given: NDArray[np.int64] | None, out: NDArray[np.int64],
     ) -> None:  # fmt: skip
         """Codes n latents of each position to `out` [N, n] by network outputs `total` [N, 2 n]."""
         total += _floats(bias)
@@ -253,6 +246,8 @@ class LevelCoder:
         mean = _clamped(scaled(total[:, :n].copy(), 1 - weights.exponent), -(1 << 14), 1 << 14)
         scale = scaled(total[:, n:].copy(), 2 - weights.exponent) + (32 + self.shifts[kind])
         scale = _clamped(scale, 0, laplace.SCALES - 1)
+        # Scale and mean 0 make a latent certain: bands that are not there have no symbols.
+        mean, scale = (v * np.tile(there, n // 3) for v in (mean, scale))
         values = np.zeros(out.size, np.int64) if given is None else given[:, :n].ravel()
         coded = coder.code(values, mean.astype(np.int64).ravel(), scale.astype(np.int64).ravel())
         out[:] = coded.reshape(out.shape)

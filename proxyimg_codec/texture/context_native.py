@@ -13,6 +13,7 @@ from ..errors import FormatError
 from ..native import kernel
 from . import context
 from .context import Ints, LevelCoder
+from .grid import Bands
 
 WEIGHTS = (
     "first", "first_bias", "second", "second_bias", "causal", "mix", "mix_bias", "luma",
@@ -74,7 +75,7 @@ class _Level(ct.Structure):
         ("shifts", ct.c_int32 * 2),
         ("logs", ct.c_void_p),
         ("n_logs", ct.c_int64),
-        *((n, ct.c_void_p) for n in ("low", "parent", "support", "given", "latents")),
+        *((n, ct.c_void_p) for n in ("low", "parent", "bands", "given", "latents")),
     ]
 
 
@@ -85,13 +86,13 @@ class Place(NamedTuple):
         coder: Coder of the level, with the weights of its network.
         low: int32 [3, h, w] plain planes in 1/16.
         parent: int32 [9, ceil(h / 2), ceil(w / 2)] latents of the coarser level, or zeros.
-        support: bool [h, w], True at positions that are coded.
+        bands: uint8 [h, w], bit b set where band b is coded.
     """
 
     coder: LevelCoder
     low: Ints
     parent: Ints
-    support: NDArray[np.bool_]
+    bands: Bands
 
 
 def decode(at: Place, stream: rans.Decoder, escapes: bytes, used: int) -> tuple[Ints, int]:
@@ -137,8 +138,8 @@ def encode(at: Place, values: Ints, stream: rans.Encoder) -> tuple[Ints, NDArray
     Raises:
         MemoryError: The kernel cannot allocate what it needs.
     """
-    h, w = at.support.shape
-    most = 9 * int(np.count_nonzero(at.support))
+    h, w = at.bands.shape
+    most = 9 * int(np.count_nonzero(at.bands))
     start, freq = np.empty(2 * most, np.uint16), np.empty(2 * most, np.uint16)
     ends, escapes = np.empty(4 * (w + 3 * h), np.int64), np.empty(most, np.int64)
     sink = _Sink(*(kernel.pointer(a) for a in (start, freq, ends, escapes)))
@@ -153,7 +154,7 @@ def _run(at: Place, values: Ints | None, source: _Source, sink: _Sink) -> tuple[
     lib = kernel.library()
     assert lib is not None, "check available() first"
     coder, weights = at.coder, at.coder.weights
-    h, w = at.support.shape
+    h, w = at.bands.shape
     tables = laplace.tables()
     alive: list[NDArray[Any]] = []
 
@@ -177,7 +178,7 @@ def _run(at: Place, values: Ints | None, source: _Source, sink: _Sink) -> tuple[
         ),
         source, sink, h, w, coder.grey, (ct.c_int32 * 2)(*coder.shifts),
         address(context.LOG, np.int32), len(context.LOG),
-        address(at.low, np.int32), address(at.parent, np.int32), address(at.support, np.uint8),
+        address(at.low, np.int32), address(at.parent, np.int32), address(at.bands, np.uint8),
         None if values is None else address(values, np.int32),
         kernel.pointer(latents),
     )  # fmt: skip

@@ -17,6 +17,7 @@ from ..errors import FormatError
 from ..native import kernel
 from . import context, context_native, registered_model
 from .context import Ints
+from .grid import Grid
 
 SHIFT_ORIGIN = 8
 """Number added to a shift of the scale index when it is stored."""
@@ -91,13 +92,13 @@ def steps(
         UnsupportedError: The model is unknown.
     """
     weights = registered_model.registered(fields["model"])
-    levels, step, size = fields["levels"], fields["step"], fields["size"]
-    columns, rows = (-(-n >> levels) for n in size)
+    grid, step = Grid.of(fields), fields["step"]
+    rows, columns = grid.at(grid.levels)
     lowest = _code_lowest(coder, fields, (rows, columns), values)
     yield lowest
     plain = lowest << 4
     parent = np.zeros((9, -(-rows // 2), -(-columns // 2)), np.int32)
-    for level in range(levels, 0, -1):
+    for level in range(grid.levels, 0, -1):
         shifts = fields["shifts"][2 * level - 2 : 2 * level]
         here = context.LevelCoder(
             weights.context[min(level, registered_model.LEVEL_SETS) - 1],
@@ -105,15 +106,15 @@ def steps(
             level <= fields["grey"],
             (shifts[0] - SHIFT_ORIGIN, shifts[1] - SHIFT_ORIGIN),
         )
-        support = support_at(cells, fields["cell"], size, level, levels)
+        bands = grid.bands(cells, fields["cell"], level)
         given = None if values is None else values.levels[level - 1]
         if kernel.available():
-            parent = coder.level(context_native.Place(here, plain, parent, support), given)
+            parent = coder.level(context_native.Place(here, plain, parent, bands), given)
         else:
-            parent = here.code(coder, plain, parent, support, given)
+            parent = here.code(coder, plain, parent, bands, given)
         yield parent
         if level > 1:
-            plain = context.next_plain(plain, parent)
+            plain = context.next_plain(plain, parent, grid.at(level - 1))
 
 
 def _code_lowest(
@@ -136,34 +137,6 @@ def _code_lowest(
             given[:] = values.lowest[:count, i, j]
         coded = coder.code(given.T.ravel(), mean.T.astype(np.int64).ravel(), np.tile(scale, len(i)))
         out[:count, i, j] = coded.reshape(-1, count).T
-    return out
-
-
-def support_at(
-    cells: NDArray[np.bool_], cell: int, size: tuple[int, int], level: int, levels: int
-) -> NDArray[np.bool_]:
-    """Positions of a level that have latents: those over at least one sample of a stored cell.
-
-    Args:
-        cells: bool [rows, columns] cells that have latents.
-        cell: Binary logarithm of the side of a cell in samples.
-        size: Width and height of the raster in samples.
-        level: Number of the level, from 1, the finest.
-        levels: Number of levels.
-
-    Returns:
-        bool [h, w] with the shape of the level.
-    """
-    columns, rows = (-(-n >> levels) << levels for n in size)
-    out = np.zeros((rows >> level, columns >> level), bool)
-    if level < cell:
-        fine = cells.repeat(1 << (cell - level), 0).repeat(1 << (cell - level), 1)
-        h, w = -(-size[1] >> level), -(-size[0] >> level)
-        out[:h, :w] = fine[:h, :w]
-        return out
-    by = level - cell
-    i, j = np.nonzero(cells)
-    out[i >> by, j >> by] = True
     return out
 
 

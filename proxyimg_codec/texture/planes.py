@@ -14,6 +14,7 @@ from ..entropy import arrays, laplace
 from ..errors import FormatError
 from . import context, registered_model, synthesis
 from .context import Ints
+from .grid import Grid
 from .latents import SHIFT_ORIGIN, Decoder, Latents, decode, encode, steps
 from .network import Floats
 
@@ -75,7 +76,8 @@ class Planes:
         """
         found = self.latents
         weights = registered_model.registered(self.packed["model"])
-        out = synthesis.samples(weights, found.levels, found.lowest, self.packed["step"])
+        grid = Grid.of(self.packed)
+        out = synthesis.samples(weights, grid, found.levels, found.lowest, self.packed["step"])
         columns, rows = self.size
         out = np.ascontiguousarray(out[:rows, :columns])
         if self.components == 1:
@@ -108,13 +110,13 @@ def unpack(fields: Mapping[str, Any], where: str = "chunk PLAN") -> Planes:
 
 def encoded(
     latents: Latents, size: tuple[int, int], step: int, support: NDArray[np.bool_] | None = None,
-    cell: int = 3, components: int = 3, number: int = 1,
+    cell: int = 3, components: int = 3, number: int = 2,
     shifts: tuple[int, ...] | None = None,
 ) -> Planes:  # fmt: skip
     """Encodes latents as planes.
 
     Args:
-        latents: The latents. Those outside the support are taken as 0, except the lowest planes.
+        latents: The latents. Those that are not coded are taken as 0.
         size: Width and height of the raster in samples.
         step: Quantization step in 1/64 octave: it is 2**(step / 64) levels of 8 bits.
         support: bool [rows, columns] cells that have latents; None for all.
@@ -188,11 +190,8 @@ def salvaged(planes: Planes) -> tuple[Planes, int]:
     else:
         return planes, packed["levels"]
     del found[packed["levels"] :]
-    count = len(found) - 1
-    rows, columns = found[0].shape[1:]
-    found += [
-        np.zeros((9, rows << k, columns << k), np.int32) for k in range(count, packed["levels"])
-    ]
+    count, grid = len(found) - 1, Grid.of(packed)
+    found += [np.zeros((9, *grid.at(k)), np.int32) for k in range(grid.levels - count, 0, -1)]
     shifts = tuple(v - SHIFT_ORIGIN for v in packed["shifts"])
     sound = encoded(
         Latents(tuple(found[:0:-1]), found[0]), planes.size, packed["step"], support,

@@ -23,8 +23,28 @@ MAGIC = b"PXIMODL1"
 LEVEL_SETS = 4
 """Number of sets of weights: for levels 1, 2, 3, and for all coarser levels."""
 
-REGISTERED = {1: "91e24c9aca7764cc60f13d481e139d4a1ef71bbe6cffe0b1f3850315bb2d0934"}
-"""SHA-256 of the file of each model, by registered number."""
+
+class Registration(NamedTuple):
+    """Entry of the registry of models.
+
+    Attributes:
+        file: Name of the file of its weights, without suffix; models may share one.
+        digest: SHA-256 of that file.
+        padded: Whether its planes are those of a raster padded to multiples of 2**levels.
+    """
+
+    file: str
+    digest: str
+    padded: bool
+
+
+_FIRST = "91e24c9aca7764cc60f13d481e139d4a1ef71bbe6cffe0b1f3850315bb2d0934"
+
+REGISTERED = {
+    1: Registration("pyramid-1", _FIRST, True),
+    2: Registration("pyramid-1", _FIRST, False),
+}
+"""Models by registered number."""
 
 STEP_ORIGIN = 293
 """Origin of the quantization step as an input of networks: (step - STEP_ORIGIN) / 128."""
@@ -161,17 +181,31 @@ def unpack(data: bytes) -> Model:
     return Model(arrays[0], tuple(contexts), tuple(syntheses))
 
 
-@functools.cache
-def registered(number: int) -> Model:
-    """Loads the model with a registered number, once.
+def registration(number: int) -> Registration:
+    """Finds the entry of a registered number.
 
     Raises:
-        UnsupportedError: This program does not have the model, or its file is damaged.
+        UnsupportedError: This program does not have the model.
     """
     if number not in REGISTERED:
         raise UnsupportedError(f"chunk PLAN: pyramid model {number} is not known; update "
                                "proxyimg-codec", rule="PYR-1")  # fmt: skip
-    data = resources.files("proxyimg_codec.models").joinpath(f"pyramid-{number}.bin").read_bytes()
-    if hashlib.sha256(data).hexdigest() != REGISTERED[number]:
-        raise UnsupportedError(f"the weights of pyramid model {number} are damaged; reinstall")
+    return REGISTERED[number]
+
+
+def registered(number: int) -> Model:
+    """Loads the weights of the model with a registered number, once.
+
+    Raises:
+        UnsupportedError: This program does not have the model, or its file is damaged.
+    """
+    entry = registration(number)
+    return _loaded(entry.file, entry.digest)
+
+
+@functools.cache
+def _loaded(file: str, digest: str) -> Model:
+    data = resources.files("proxyimg_codec.models").joinpath(f"{file}.bin").read_bytes()
+    if hashlib.sha256(data).hexdigest() != digest:
+        raise UnsupportedError(f"the weights {file}.bin are damaged; reinstall proxyimg-codec")
     return unpack(data)

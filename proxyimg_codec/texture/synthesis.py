@@ -13,15 +13,13 @@ from ..native import kernel
 from . import synthesis_native
 from .context import Ints
 from .convolution import by_row, convolved, strips
+from .grid import BANDS, Grid, mirrored_indices
 from .network import Floats
 from .registered_model import STEP_ORIGIN, Model, Synthesis
 
 # Antonini et al. 1992, table II, orthonormal: half of the synthesis filters of the CDF 9/7 wavelet.
 _LOW = (0.788485616406, 0.418092273222, -0.040689417609, -0.064538882629)
 _HIGH = (0.852698679009, -0.377402855613, -0.110624404418, 0.023849465020, 0.037828455507)
-
-BANDS = ((0, 1), (1, 0), (1, 1))
-"""Bands of the three latents of a colour at a position: (vertical, horizontal), 1 = high pass."""
 
 
 @functools.cache
@@ -51,42 +49,46 @@ def _planes(colour: int) -> list[tuple[int, tuple[int, int]]]:
     return [(3 + 3 * band + colour, way) for band, way in enumerate(BANDS)]
 
 
-def samples(model: Model, latents: Sequence[Ints], lowest: Ints, step: int) -> Floats:
+def samples(model: Model, grid: Grid, latents: Sequence[Ints], lowest: Ints, step: int) -> Floats:
     """Computes the samples of a raster from its latents.
 
     Args:
         model: The registered model.
+        grid: Sizes of the planes.
         latents: int32 [9, h, w] latents of each level, from level 1, the finest, on.
         lowest: int32 [3, h, w] lowest planes.
         step: Quantization step, as in PLAN.
 
     Returns:
-        float32 [H, W, 3] samples in 0..255, not clipped.
+        float32 [H, W, 3] samples in 0..255, not clipped; with padding, if planes are padded.
     """
     out = np.ascontiguousarray(lowest.transpose(1, 2, 0), np.float32)
     for number in range(len(latents), 0, -1):
         weights = model.synthesis[min(number, len(model.synthesis)) - 1]
-        out = _finer(weights, out, latents[number - 1], step)
+        out = _finer(weights, out, latents[number - 1], step, grid.at(number - 1))
     colours = model.to_colour.floats * np.float32(2 ** (step / 64))
     for top, bottom in strips(*out.shape[:2]):
         out[top:bottom] = out[top:bottom] @ colours.T + 128
     return out
 
 
-def _finer(weights: Synthesis, low: Floats, latents: Ints, step: int) -> Floats:
-    """Next finer planes float32 [2 h, 2 w, 3] from planes [h, w, 3] and latents [9, h, w]."""
+def _finer(
+    weights: Synthesis, low: Floats, latents: Ints, step: int, shape: tuple[int, int]
+) -> Floats:
+    """Next finer planes float32 [*shape, 3] from planes [h, w, 3] and latents [9, h, w]."""
     t = np.float32((step - STEP_ORIGIN) / 128)
     gain = np.exp(weights.gain.floats + weights.gain_by_step.floats * t)
     bias = weights.first_bias.floats + weights.first_by_step.floats * t
     linear = (wavelet() + weights.delta.floats).astype(np.float32)
     if kernel.available():
-        return synthesis_native.finer(weights, linear, gain, bias, low, latents)
-    return _filtered(weights, linear, gain, bias, low, latents)
+        return synthesis_native.finer(weights, linear, gain, bias, low, latents, shape)
+    return _filtered(weights, linear, gain, bias, low, latents, shape)
 
 
 def _filtered(
-    weights: Synthesis, linear: Floats, gain: Floats, bias: Floats, low: Floats, latents: Ints
-) -> Floats:
+    weights: Synthesis, linear: Floats, gain: Floats, bias: Floats, low: Floats, latents: Ints,
+    shape: tuple[int, int],
+) -> Floats:  # fmt: skip
     """Does the same as `synthesis_native.finer`, in numpy."""
     h, w = low.shape[:2]
     # Outputs are ordered as 2 rows of 2 samples of 3 colours.
@@ -111,11 +113,11 @@ def _filtered(
             z[-1] = 0
         z = convolved(z, third, 1, 1 + bottom - top)
         z += third_bias
-        wide = _extended(low, latents, gain, top, bottom)
+        wide = _extended(low, latents, gain, shape, top, bottom)
         straight = convolved(wide, wavelets, 2, 2 + bottom - top).reshape(-1, w + 4, 12)
         z = z.reshape(-1, w, 12) + straight[:, 2:-2]
         out[top:bottom] = z.reshape(-1, w, 2, 6).swapaxes(1, 2)
-    return out.reshape(2 * h, 2 * w, 3)
+    return np.ascontiguousarray(out.reshape(2 * h, 2 * w, 3)[: shape[0], : shape[1]])
 
 
 def _soft(x: Floats) -> Floats:
@@ -131,34 +133,24 @@ def _high_pass(x: Floats, start: int, end: int) -> Floats:
     return x[start:end] - around
 
 
-def _extended(low: Floats, latents: Ints, gain: Floats, top: int, bottom: int) -> Floats:
+def _extended(
+    low: Floats, latents: Ints, gain: Floats, shape: tuple[int, int], top: int, bottom: int
+) -> Floats:
     """Rows top - 2 .. bottom + 1 of all bands, mirrored beyond the edges as the wavelet needs it.
 
     Returns:
         float32 [bottom - top + 4, w + 4, 12]: 3 low bands, then 9 high bands times their gain.
     """
     out = np.empty((bottom - top + 4, low.shape[1] + 4, 12), np.float32)
-    out[..., :3] = _mirrored(low, False, False, top, bottom)
-    for band, (v, h) in enumerate(BANDS):
-        part = _mirrored(latents[band::3].transpose(1, 2, 0), bool(v), bool(h), top, bottom)
+    out[..., :3] = _mirrored(low, (0, 0), shape, top, bottom)
+    for band, ways in enumerate(BANDS):
+        part = _mirrored(latents[band::3].transpose(1, 2, 0), ways, shape, top, bottom)
         out[..., 3 + 3 * band : 6 + 3 * band] = part * gain[band::3]
     return out
 
 
 def _mirrored(
-    planes: NDArray[Any], vertical: bool, horizontal: bool, top: int, bottom: int
+    planes: NDArray[Any], ways: tuple[int, int], shape: tuple[int, int], top: int, bottom: int
 ) -> NDArray[Any]:
-    rows = mirrored_indices(planes.shape[0], vertical)[top : bottom + 4]
-    return planes[rows[:, None], mirrored_indices(planes.shape[1], horizontal)]
-
-
-def mirrored_indices(n: int, high: bool) -> NDArray[np.int64]:
-    """Indices -2..n + 1 of a band of n samples, mirrored into 0..n - 1; int64 [n + 4].
-
-    A low band is mirrored about its first sample and behind its last one, a high band before its
-    first sample and about its last one.
-    """
-    index = np.arange(-2, n + 2)
-    index = np.where(index < 0, -index - int(high), index)
-    index = np.where(index >= n, 2 * n - 1 - int(high) - index, index)
-    return np.clip(index, 0, n - 1)
+    rows, columns = (mirrored_indices(n, bool(way)) for n, way in zip(shape, ways, strict=True))
+    return planes[rows[top : bottom + 4, None], columns]

@@ -24,14 +24,15 @@ class _Level(ct.Structure):
 
     _fields_ = [
         *((n, ct.c_void_p) for n in ARRAYS),
-        *((n, ct.c_int32) for n in ("hidden", "height", "width")),
+        *((n, ct.c_int32) for n in ("hidden", "height", "width", "rows", "columns")),
         *((n, ct.c_void_p) for n in ("low", "latents", "out")),
     ]
 
 
 def finer(
-    weights: Synthesis, linear: Floats, gain: Floats, bias: Floats, low: Floats, latents: Ints
-) -> Floats:
+    weights: Synthesis, linear: Floats, gain: Floats, bias: Floats, low: Floats, latents: Ints,
+    shape: tuple[int, int],
+) -> Floats:  # fmt: skip
     """Computes the next finer planes of a raster.
 
     Args:
@@ -41,9 +42,10 @@ def finer(
         bias: float32 [H] biases of the first layer for the quantization step.
         low: float32 [h, w, 3] planes.
         latents: int32 [9, h, w] latents of the level.
+        shape: Rows and columns of the finer planes: 2 h or 2 h - 1, and so on.
 
     Returns:
-        float32 [2 h, 2 w, 3] planes.
+        float32 [rows, columns, 3] planes.
 
     Raises:
         MemoryError: The kernel cannot allocate what it needs.
@@ -55,10 +57,11 @@ def finer(
     own |= {"linear": linear, "gain": gain, "first_bias": bias}
     arrays = [np.ascontiguousarray(own[n], np.float32) for n in ARRAYS]
     low, latents = np.ascontiguousarray(low), np.ascontiguousarray(latents, np.int32)
-    out = np.empty((2 * h, 2 * w, 3), np.float32)
+    out = np.empty((*shape, 3), np.float32)
     level = _Level(
-        *map(kernel.pointer, arrays), len(bias), h, w, *map(kernel.pointer, (low, latents, out))
-    )
+        *map(kernel.pointer, arrays), len(bias), h, w, *shape,
+        *map(kernel.pointer, (low, latents, out)),
+    )  # fmt: skip
     if lib.pxi_pyramid_synthesis(ct.byref(level)):
         raise MemoryError("not enough memory to decode a pyramid")
     return out

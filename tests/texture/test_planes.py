@@ -9,7 +9,8 @@ from proxyimg_codec.entropy import laplace
 from proxyimg_codec.errors import FormatError
 from proxyimg_codec.native import kernel
 from proxyimg_codec.texture import context, planes, registered_model, synthesis
-from proxyimg_codec.texture.latents import Encoder, Latents, support_at
+from proxyimg_codec.texture.grid import Grid, by_channel, mirrored_indices
+from proxyimg_codec.texture.latents import Encoder, Latents
 from proxyimg_codec.texture.planes import Planes
 
 needs_kernel = pytest.mark.skipif(not kernel.available(), reason="the kernel was not compiled")
@@ -29,16 +30,14 @@ def each(request):
         yield
 
 
-def shapes(size, levels):
-    """Rows and columns of levels 1.., and of the lowest plane."""
-    columns, rows = (-(-n >> levels) << levels for n in size)
-    return [(rows >> k, columns >> k) for k in (*range(1, levels + 1), levels)]
+def grid_of(size, levels, model):
+    return Grid(size, levels, registered_model.registration(model).padded)
 
 
-def made(rng, size, levels, spread, grey=0):
+def made(rng, grid, spread, grey=0):
     """Latents with Laplace statistics, wider at coarser levels, a few of them far off."""
-    found = []
-    for k, (h, w) in enumerate(shapes(size, levels)):
+    found, levels = [], grid.levels
+    for k, (h, w) in enumerate(grid.at(k) for k in (*range(1, levels + 1), levels)):
         y = rng.laplace(0, spread * 1.5**k, (3 if k == levels else 9, h, w))
         y[rng.random(y.shape) < 0.01] *= 30
         y = np.clip(np.rint(y), 1 - context.LIMIT, context.LIMIT - 1)
@@ -69,13 +68,14 @@ def cases(draw):
     components = draw(st.sampled_from([1, 3]))
     spread = draw(st.sampled_from([0.05, 0.5, 4, 100, 30000]))
     grey = levels if components == 1 else draw(st.integers(0, levels))
-    latents = made(rng, size, levels, spread, grey)
+    model = draw(st.sampled_from([1, 2]))
+    latents = made(rng, grid_of(size, levels, model), spread, grey)
     if components == 1:
         latents.lowest[1:] = 0
     cell = draw(st.integers(1, 5))
     cells = random_cells(rng, size, cell) if draw(st.booleans()) else None
     shifts = tuple(rng.integers(-8, 8, 2 * levels).tolist())
-    return latents, size, draw(st.integers(0, 640)), cells, cell, components, 1, shifts
+    return latents, size, draw(st.integers(0, 640)), cells, cell, components, model, shifts
 
 
 def same(a, b):
@@ -86,7 +86,7 @@ def same(a, b):
 @given(cases())
 def test_latents_come_back(case):
     """By both engines, from the same bytes; but those that are certain, and outside, become 0."""
-    latents, size, _, cells, cell, *_ = case
+    latents, size, _, cells, cell, _, model, _ = case
     made_by, found_by = {}, {}
     for name in ("numpy", "kernel")[: 1 + kernel.available()]:
         with engine(name):
@@ -100,9 +100,9 @@ def test_latents_come_back(case):
     for level, (y, was) in enumerate(zip(found.levels, latents.levels, strict=True), 1):
         assert y.dtype == np.int32
         assert ((y == was) | (y == 0)).all()
-        if cells is not None:
-            at = support_at(cells, cell, size, level, len(found.levels))
-            assert not y[:, ~at].any()
+        grid = grid_of(size, len(found.levels), model)
+        stored = np.ones(planes.cells_of(size, cell), bool) if cells is None else cells
+        assert not y[~by_channel(grid.bands(stored, cell, level))].any()
     # What was found has all of it in the stream.
     again = planes.encoded(found, *case[1:])
     assert same(again.latents, found)
@@ -119,7 +119,7 @@ def outcome(name, fields):
 
 def example(size=(21, 13), levels=2, spread=3.0, **more):
     rng = np.random.default_rng(5)
-    return planes.encoded(made(rng, size, levels, spread), size, 293, **more)
+    return planes.encoded(made(rng, Grid(size, levels), spread), size, 293, **more)
 
 
 @needs_kernel
@@ -229,8 +229,8 @@ def test_features_and_planes_stay_within_bounds():
     rng = np.random.default_rng(0)
     signs = rng.choice([-1, 1], (12, 6, 7)).astype(np.int32)
     low, high = signs[:3] * (context.LIMIT << 4), signs[3:] * (context.LIMIT - 4)
-    plain = context.next_plain(low, high)
-    exact = context.next_plain(low // 4, high // 4)  # far from any bound
+    plain = context.next_plain(low, high, (12, 13))
+    exact = context.next_plain(low // 4, high // 4, (12, 13))  # far from any bound
     clipped = np.clip(4.0 * exact, -(context.LIMIT << 4), context.LIMIT << 4)
     assert np.abs(plain - clipped).max() < 16
 
@@ -267,21 +267,23 @@ def test_waves(size):
 
 
 @pytest.mark.usefixtures("each")
+@pytest.mark.parametrize("model", [1, 2])
 @pytest.mark.parametrize("components", [1, 3])
 @pytest.mark.parametrize("size", [(1, 1), (21, 13), (32, 64)])
-def test_rasters(size, components):
+def test_rasters(size, components, model):
     """Of the size of the picture, whatever is padded; grey ones have the mean of all colours."""
-    rng = np.random.default_rng(2)
-    latents = made(rng, size, 3, 2, 0 if components == 3 else 3)
+    grid = grid_of(size, 3, model)
+    latents = made(np.random.default_rng(2), grid, 2, 0 if components == 3 else 3)
     if components == 1:
         latents.lowest[1:] = 0
-    coded = planes.encoded(latents, size, 293, components=components)
+    coded = planes.encoded(latents, size, 293, components=components, number=model)
     got = coded.raster
     assert got.shape == (size[1], size[0], components)
     assert got.dtype == np.float32
     assert got.flags.c_contiguous
     found = coded.latents
-    whole = synthesis.samples(registered_model.registered(1), found.levels, found.lowest, 293)
+    weights = registered_model.registered(model)
+    whole = synthesis.samples(weights, grid, found.levels, found.lowest, 293)
     part = whole[: size[1], : size[0]]
     expected = part if components == 3 else part.mean(2, keepdims=True)
     np.testing.assert_allclose(got, np.clip(expected / 255, 0, 1), atol=1e-6)
@@ -292,15 +294,51 @@ def test_rasters(size, components):
 @settings(max_examples=15, deadline=None)
 @given(cases())
 def test_engines_synthesize_alike(case):
-    latents, _, step, *_ = case
+    latents, size, step, _, _, _, model, _ = case
+    weights, grid = registered_model.registered(model), grid_of(size, len(latents.levels), model)
     found = {}
     for name in ("numpy", "kernel"):
         with engine(name):
-            found[name] = synthesis.samples(
-                registered_model.registered(1), latents.levels, latents.lowest, step
-            )
+            found[name] = synthesis.samples(weights, grid, latents.levels, latents.lowest, step)
     scale = max(np.abs(found["numpy"]).max(), 255)
     np.testing.assert_allclose(found["kernel"], found["numpy"], atol=1e-5 * scale)
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 4, 5, 8, 9, 30, 31])
+def test_bands_are_mirrored_as_the_line_is(size):
+    """The halves of a line that is mirrored about its first and last value are what indices say."""
+    period = max(2 * size - 2, 1)
+    line = np.arange(size)
+    for high in (False, True):
+        index = mirrored_indices(size, high)
+        assert len(index) == (size + 1) // 2 + 4
+        wanted = (2 * np.arange(-2, (size + 1) // 2 + 2) + high) % period
+        wanted = np.where(wanted < size, wanted, period - wanted)
+        if size > 3:  # else they reach beyond the mirrored line, and are clamped
+            np.testing.assert_array_equal(line[np.minimum(2 * index + high, size - 1)], wanted)
+        assert index.min() >= 0
+        assert index.max() < max(size // 2 if high else (size + 1) // 2, 1)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (5, 3), (64, 48), (77, 50), (29, 130)])
+def test_levels_have_as_many_latents_as_samples(size):
+    """Critically sampled: the bands of all levels and the lowest planes replace the samples."""
+    for levels in (1, 3, 6):
+        grid = Grid(size, levels)
+        cells = np.ones(planes.cells_of(size, 3), bool)
+        coded = [by_channel(grid.bands(cells, 3, k)).sum() for k in range(1, levels + 1)]
+        rows, columns = grid.at(levels)
+        assert sum(coded) + 3 * rows * columns == 3 * size[0] * size[1]
+
+
+def test_the_support_reaches_one_position_beyond_coarse_cells():
+    cells = np.zeros((10, 12), bool)
+    cells[4, 5] = True  # samples 32..39 down, 40..47 across
+    for level, rows, columns in ((2, (8, 9), (10, 11)), (3, (3, 5), (4, 6)), (4, (1, 3), (1, 3))):
+        there = Grid((96, 80), 5).bands(cells, 3, level) > 0
+        i, j = np.nonzero(there)
+        assert ((i.min(), i.max()), (j.min(), j.max())) == (rows, columns)
+        assert there[rows[0] : rows[1] + 1, columns[0] : columns[1] + 1].all()
 
 
 def test_strips_do_not_show(monkeypatch):

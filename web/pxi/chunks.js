@@ -1,6 +1,7 @@
 /** Chapter 3: the values of every chunk, and the rules between chunks. */
 
 import { need, supported, within } from "./errors.js";
+import { MODEL_FILES } from "./model.js";
 import { Values } from "./msgpack.js";
 
 const BYTES_MAX = 2 ** 31 - 1;
@@ -173,7 +174,7 @@ function checkPoses({ poses, meshes }) {
 /** PYR-1 to PYR-3, and the limits of SEC-2. */
 function checkPlans({ plans, textures }, limits) {
   for (const plan of plans) {
-    supported(plan.model === 1, `model ${plan.model}`);
+    supported(plan.model in MODEL_FILES, `model ${plan.model}`);
     need(plan.components !== 2, "planes of two components");
     need(plan.grey <= plan.levels, "more grey levels than levels");
     need(plan.components === 3 || plan.grey === plan.levels, "grey planes with chroma");

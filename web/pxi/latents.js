@@ -3,7 +3,7 @@
 import { Rans, decodeMask } from "./entropy.js";
 import { need } from "./errors.js";
 import { clamp } from "./integers.js";
-import { Rows, conv3, mirrored, rough } from "./planes.js";
+import { Rows, conv3, mirrored, rough, shapeOf } from "./planes.js";
 import { DECAY, REACHES } from "./scales.js";
 
 const STEP_ORIGIN = 293;
@@ -176,39 +176,40 @@ function decodeLowest(coder, scales, rows, columns) {
 const LOW_TAPS = [[0, -10, 202, -10, 0], [0, -17, 107, 107, -17]];
 const HIGH_TAPS = [[6, -97, -97, 6, 0], [10, -28, 218, -28, 10]];
 
-/** J of PYR-16 for one line of n values, with strides of the inputs and the output. */
-function join(low, high, at, n, step, scale, out, to, stride) {
+/** J of PYR-16 for one line that becomes `size` values, with strides of the inputs and the output. */
+function join(low, high, at, size, step, scale, out, to, stride) {
+  const length = ((size + 1) >> 1) + 4;
   const line = (values, isHigh, factor) =>
-    Int32Array.from({ length: n + 4 }, (_, i) => factor * values[at + mirrored(i - 2, n, isHigh) * step]);
+    Int32Array.from({ length }, (_, i) => factor * values[at + mirrored(i - 2, size, isHigh) * step]);
   const a = line(low, 0, 1);
   const b = line(high, 1, scale);
-  for (let i = 0; i < n; i++) {
-    for (const phase of [0, 1]) {
-      const [l, h] = [LOW_TAPS[phase], HIGH_TAPS[phase]];
-      let sum = 128;
-      for (let k = 0; k < 5; k++) sum += l[k] * a[i + k] + h[k] * b[i + k];
-      out[to + (2 * i + phase) * stride] = sum >> 8;
-    }
+  for (let n = 0; n < size; n++) {
+    const [l, h] = [LOW_TAPS[n & 1], HIGH_TAPS[n & 1]];
+    let sum = 128;
+    for (let k = 0; k < 5; k++) sum += l[k] * a[(n >> 1) + k] + h[k] * b[(n >> 1) + k];
+    out[to + n * stride] = sum >> 8;
   }
 }
 
-/** The plain plane of the next finer level from that of a level and its three bands (PYR-15). */
-function nextPlain(plain, bands, rows, columns) {
+/**
+ * The plain plane of the next finer level, of `rows` and `columns`, from that of a level and its
+ * three bands (PYR-15).
+ */
+function nextPlain(plain, bands, [rows, columns]) {
   const sixteenfold = bands[0].map((v) => 16 * v);
-  const left = new Int32Array(2 * rows * columns);
+  const half = (columns + 1) >> 1;
+  const left = new Int32Array(rows * half);
   const right = new Int32Array(left.length);
-  for (let x = 0; x < columns; x++) {
-    join(plain, bands[1], x, rows, columns, 16, left, x, columns);
-    join(sixteenfold, bands[2], x, rows, columns, 16, right, x, columns);
+  for (let x = 0; x < half; x++) {
+    join(plain, bands[1], x, rows, half, 16, left, x, half);
+    join(sixteenfold, bands[2], x, rows, half, 16, right, x, half);
   }
-  const out = new Int32Array(4 * rows * columns);
-  for (let y = 0; y < 2 * rows; y++) {
-    join(left, right, y * columns, columns, 1, 1, out, 2 * y * columns, 1);
-  }
+  const out = new Int32Array(rows * columns);
+  for (let y = 0; y < rows; y++) join(left, right, y * half, columns, 1, 1, out, y * columns, 1);
   return out.map((v) => clamp(v, -(2 ** 20), 2 ** 20));
 }
 
-/** Which positions of a level have latents (PYR-5, PYR-6): a byte for each, or null for all. */
+/** Which positions of a level lie over a stored sample (PYR-5, PYR-6): a byte for each. */
 function supportOf({ cell, size: [w, h] }, cells, level, rows, columns) {
   const wide = Math.ceil(w / 2 ** cell);
   const side = 2 ** level;
@@ -229,10 +230,37 @@ function supportOf({ cell, size: [w, h] }, cells, level, rows, columns) {
   return support;
 }
 
+/** A support with the eight neighbours of each position. */
+function grown(support, rows, columns) {
+  const out = new Uint8Array(support.length);
+  for (let y = 0; y < rows; y++) {
+    for (let x = 0; x < columns; x++) {
+      if (!support[y * columns + x]) continue;
+      for (let j = Math.max(y - 1, 0); j <= Math.min(y + 1, rows - 1); j++) {
+        out.fill(1, j * columns + Math.max(x - 1, 0), j * columns + Math.min(x + 2, columns));
+      }
+    }
+  }
+  return out;
+}
+
+/** Which latents of a level are coded (PYR-6): a byte for each position, with bit b for band b. */
+function bandsOf(plan, cells, level) {
+  const [rows, columns] = shapeOf(plan, level);
+  let support = supportOf(plan, cells, level, rows, columns);
+  if (plan.model > 1 && level >= plan.cell) support = grown(support, rows, columns);
+  const [finerRows, finerColumns] = shapeOf(plan, level - 1);
+  return support.map((some, at) => {
+    const across = at % columns < finerColumns >> 1;
+    const down = at < (finerRows >> 1) * columns;
+    return some && (across ? 1 : 0) + (down ? 2 : 0) + (across && down ? 4 : 0);
+  });
+}
+
 /** One level: its context networks, and the waves in which it is coded (PYR-18 to PYR-28). */
 class Level {
-  constructor(net, { step }, rows, columns, support) {
-    Object.assign(this, { net, rows, columns, support });
+  constructor(net, { step }, [rows, columns], bands) {
+    Object.assign(this, { net, rows, columns, bands });
     this.width = net.width;
     this.latents = Array.from({ length: 9 }, () => new Int32Array(rows * columns));
     this.some = new Uint8Array(rows * columns); // whether a position has a latent that is not 0
@@ -268,7 +296,7 @@ class Level {
 
   /** The results of the second layer [rows, columns, width] (PYR-20 to PYR-22). */
   ahead(plain, parent) {
-    const { rows, columns, width, net, support } = this;
+    const { rows, columns, width, net, bands } = this;
     const wide = columns + 2;
     const inputs = new Rows(rows, 12 * wide, (y, row) => {
       for (let c = 0; c < 3; c++) {
@@ -276,7 +304,7 @@ class Level {
       }
       if (!parent) return;
       for (let c = 0; c < 9; c++) {
-        const from = (y >> 1) * (columns >> 1);
+        const from = (y >> 1) * ((columns + 1) >> 1);
         const to = (3 + c) * wide + 1;
         for (let x = 0; x < columns; x++) row[to + x] = logOf(parent[c][from + (x >> 1)]);
       }
@@ -292,7 +320,7 @@ class Level {
     const out = new Int16Array(rows * columns * width);
     const sums = new Float64Array(width * columns);
     for (let y = 0; y < rows; y++) {
-      if (!support.subarray(y * columns, (y + 1) * columns).includes(1)) continue;
+      if (!bands.subarray(y * columns, (y + 1) * columns).some((b) => b)) continue;
       conv3(first.around(y), width, columns, net.second, net.second_bias, width, sums, 0, columns);
       for (let o = 0; o < width; o++) {
         let to = y * columns * width + o;
@@ -306,7 +334,7 @@ class Level {
 
   /** Decodes the latents. */
   decode(coder, ahead, shifts, grey) {
-    const { rows, columns, support, width } = this;
+    const { rows, columns, bands, width } = this;
     const most = Math.min(rows, Math.ceil(columns / 3));
     const hidden = new Int32Array(most * width);
     const places = new Uint32Array(most);
@@ -318,19 +346,19 @@ class Level {
       const last = Math.min(rows - 1, Math.floor(t / 3));
       for (let y = Math.max(0, Math.ceil((t - columns + 1) / 3)); y <= last; y++) {
         const at = y * columns + t - 3 * y;
-        if (support[at]) places[count++] = at;
+        if (bands[at]) places[count++] = at;
       }
       if (!count) continue;
       for (let i = 0; i < count; i++) {
         this.#hidden(places[i], ahead, hidden, i * width);
-        this.#expect("luma", hidden, i * width, shifts[0], means, scales, 3 * i, 3);
+        this.#expect("luma", hidden, i * width, shifts[0], means, scales, 3 * i, 3, bands[places[i]]);
       }
       coder.set(means, scales, found, 3 * count);
       this.#store(places, count, found, 0, 3);
       if (grey) continue;
       for (let i = 0; i < count; i++) {
         this.#withLuma(places[i], hidden, i * width);
-        this.#expect("chroma", hidden, i * width, shifts[1], means, scales, 6 * i, 6);
+        this.#expect("chroma", hidden, i * width, shifts[1], means, scales, 6 * i, 6, bands[places[i]]);
       }
       coder.set(means, scales, found, 6 * count);
       this.#store(places, count, found, 3, 6);
@@ -380,8 +408,8 @@ class Level {
     for (let o = 0; o < width; o++) total[o] += z * mix[w + o];
   }
 
-  /** Means and scales of `count` latents (PYR-25). */
-  #expect(name, hidden, at, shift, means, scales, to, count) {
+  /** Means and scales of `count` latents (PYR-25); 0, which is certain, for bands not there. */
+  #expect(name, hidden, at, shift, means, scales, to, count, bands) {
     const { width, net } = this;
     const weights = net[name];
     const bias = net[`${name}_bias`];
@@ -391,6 +419,10 @@ class Level {
       for (let i = 0; i < width; i++) total += weights[k * width + i] * hidden[at + i];
       if (k < count) means[to + k] = clamp(ofMean(total), -16384, 16384);
       else scales[to + k - count] = clamp(ofScale(total) + 32 + shift, 0, 63);
+    }
+    if (bands === 7) return;
+    for (let k = 0; k < count; k++) {
+      if (!((bands >> k % 3) & 1)) means[to + k] = scales[to + k] = 0;
     }
   }
 
@@ -417,24 +449,23 @@ export function decodeLatents(plan, model) {
   const cells = plan.support.length
     ? decodeMask(plan.support, Math.ceil(h / 2 ** plan.cell), Math.ceil(w / 2 ** plan.cell))
     : null;
-  let [rows, columns] = [Math.ceil(h / 2 ** count), Math.ceil(w / 2 ** count)];
-  const coder = new Coder(plan, 6 * Math.min(rows, columns) * 2 ** count);
-  const lowest = decodeLowest(coder, plan.lowest, rows, columns);
+  const coder = new Coder(plan, 6 * Math.min(...shapeOf(plan, 0)) + 6);
+  const lowest = decodeLowest(coder, plan.lowest, ...shapeOf(plan, count));
   let plain = lowest.map((plane) => plane.map((v) => 16 * v));
   let parent = null;
   const levels = [];
   for (let l = count; l >= 1; l--) {
-    const support = supportOf(plan, cells, l, rows, columns);
-    const level = new Level(model.of(l).context, plan, rows, columns, support);
+    const [rows, columns] = shapeOf(plan, l);
+    const level = new Level(model.of(l).context, plan, [rows, columns], bandsOf(plan, cells, l));
     const shifts = plan.shifts.slice(2 * l - 2, 2 * l).map((v) => v - SHIFT_ORIGIN);
     level.decode(coder, level.ahead(plain, parent), shifts, l <= plan.grey);
     const { latents } = level;
     levels.unshift({ rows, columns, latents });
     if (l > 1) {
-      plain = plain.map((p, c) => nextPlain(p, latents.slice(3 * c, 3 * c + 3), rows, columns));
+      const finer = shapeOf(plan, l - 1);
+      plain = plain.map((p, c) => nextPlain(p, latents.slice(3 * c, 3 * c + 3), finer));
     }
     parent = latents;
-    [rows, columns] = [2 * rows, 2 * columns];
   }
   coder.finish();
   return { lowest, levels };

@@ -5,9 +5,8 @@ import { need, supported } from "./errors.js";
 const LEVEL_SETS = 4;
 
 /** Files of the registered models (PYR-35), relative to this module. */
-export const MODEL_FILES = {
-  1: new URL("../../proxyimg_codec/models/pyramid-1.bin", import.meta.url),
-};
+const FIRST = new URL("../../proxyimg_codec/models/pyramid-1.bin", import.meta.url);
+export const MODEL_FILES = { 1: FIRST, 2: FIRST };
 
 /** Arrays of a set of networks in their order (PYR-36): name, type, shape; H and C are widths. */
 const CONTEXT = [

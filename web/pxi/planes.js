@@ -78,9 +78,16 @@ export function rough(plane, rows, columns, y, each) {
   }
 }
 
-/** PYR-17: where an index outside of a line of n values points to. */
-export function mirrored(i, n, high) {
+/** PYR-17: where an index outside of the low or high half of a line of `size` values points to. */
+export function mirrored(i, size, high) {
+  const count = (size + 1 - high) >> 1;
   if (i < 0) i = -i - high;
-  if (i >= n) i = 2 * n - 1 - high - i;
-  return i < 0 ? 0 : i >= n ? n - 1 : i;
+  if (i >= count) i = size - 1 - high - i;
+  return Math.max(Math.min(i, count - 1), 0);
+}
+
+/** Rows and columns of the positions of a level of a PLAN; at level 0 of its samples (PYR-4). */
+export function shapeOf({ model, size: [w, h], levels }, level) {
+  if (model === 1) return [h, w].map((n) => Math.ceil(n / 2 ** levels) * 2 ** (levels - level));
+  return [h, w].map((n) => Math.ceil(n / 2 ** level));
 }

@@ -1,7 +1,7 @@
 /** Chapter 8, "Synthesis": from latents to a raster of samples. */
 
 import { clamp } from "./integers.js";
-import { Rows, conv3, mirrored, rough } from "./planes.js";
+import { Rows, conv3, mirrored, rough, shapeOf } from "./planes.js";
 
 const SMOOTH = [0.788485616406, 0.418092273222, -0.040689417609, -0.064538882629];
 const SHARP = [
@@ -24,36 +24,40 @@ function linearWeights(delta) {
   });
 }
 
-/** A plane with two mirrored columns on both sides. */
-function padded(plane, rows, columns, high) {
+/** A plane with two mirrored columns on both sides; `finer` columns are made of it. */
+function padded(plane, rows, columns, finer, high) {
   const wide = columns + 4;
   const out = new Float64Array(rows * wide);
-  const from = Int32Array.from({ length: wide }, (_, i) => mirrored(i - 2, columns, high));
+  const from = Int32Array.from({ length: wide }, (_, i) => mirrored(i - 2, finer, high));
   for (let y = 0, at = 0; y < rows; y++) {
     for (let i = 0; i < wide; i++, at++) out[at] = plane[y * columns + from[i]];
   }
   return out;
 }
 
-/** The finer planes, twice as wide and high (PYR-30 to PYR-33). */
-function finer(net, low, { rows, columns, latents }, step) {
+/** The finer planes, of rows and columns `to` (PYR-30 to PYR-33). */
+function finer(net, low, { rows, columns, latents }, step, [toRows, toColumns]) {
   const t = (step - 293) / 128;
   const gains = net.gain.map((g, k) => Math.exp(g + net.gain_by_step[k] * t));
   const high = latents.map((plane, k) => Float32Array.from(plane, (v) => v * gains[k]));
   const planes = [...low, ...[0, 1, 2].flatMap((band) => [0, 3, 6].map((c) => high[c + band]))];
   const linear = {
     weights: linearWeights(net.delta),
-    planes: planes.map((p, i) => padded(p, rows, columns, WAYS[Math.floor(i / 3)][1])),
+    planes: planes.map((p, i) => padded(p, rows, columns, toColumns, WAYS[Math.floor(i / 3)][1])),
+    rows: toRows,
   };
   const network = networkRows(net, low, high, rows, columns, t);
-  const out = [0, 1, 2].map(() => new Float32Array(4 * rows * columns));
+  const out = [0, 1, 2].map(() => new Float32Array(toRows * toColumns));
   const sums = new Float64Array(12 * columns);
   for (let y = 0; y < rows; y++) {
     conv3(network.around(y), net.width, columns, net.third, net.third_bias, 12, sums, 0, columns);
-    addLinear(linear, y, rows, columns, sums);
+    addLinear(linear, y, columns, sums);
     for (let k = 0; k < 12; k++) {
-      const to = (2 * y + ((k >> 1) & 1)) * 2 * columns + (k & 1);
-      for (let x = 0; x < columns; x++) out[k >> 2][to + 2 * x] = sums[k * columns + x];
+      const row = 2 * y + ((k >> 1) & 1);
+      if (row >= toRows) continue;
+      for (let x = k & 1, at = k * columns; x < toColumns; x += 2, at++) {
+        out[k >> 2][row * toColumns + x] = sums[at];
+      }
     }
   }
   return out;
@@ -100,7 +104,7 @@ function mix(inputs, weights, biases, size, o, columns, row) {
 }
 
 /** Adds the linear part of row y to the sums [12, columns] (PYR-32). */
-function addLinear({ weights, planes }, y, rows, columns, sums) {
+function addLinear({ weights, planes, rows }, y, columns, sums) {
   const wide = columns + 4;
   for (let p = 0; p < 12; p++) {
     const plane = planes[p];
@@ -125,14 +129,15 @@ function addLinear({ weights, planes }, y, rows, columns, sums) {
 }
 
 /** The samples of a PLAN: {columns, rows, components}, planes of 0..1 (PYR-34). */
-export function synthesize({ size, components, step }, { lowest, levels }, model) {
+export function synthesize(plan, { lowest, levels }, model) {
+  const { size, components, step } = plan;
   let planes = lowest.map((plane) => Float32Array.from(plane));
   for (let l = levels.length; l >= 1; l--) {
-    planes = finer(model.of(l).synthesis, planes, levels[l - 1], step);
+    planes = finer(model.of(l).synthesis, planes, levels[l - 1], step, shapeOf(plan, l - 1));
   }
   const [columns, rows] = size;
   const unit = 2 ** (step / 64);
-  const wide = 2 * levels[0].columns;
+  const wide = shapeOf(plan, 0)[1];
   const out = Array.from({ length: components }, () => new Float32Array(rows * columns));
   const m = model.to_colour;
   const [a, b, c] = planes;

@@ -19,7 +19,8 @@ from proxyimg_codec.container.chunks import Chunk, read, write
 from proxyimg_codec.container.fields import pack, unpack
 from proxyimg_codec.entropy import rans
 from proxyimg_codec.model import Picture
-from proxyimg_codec.texture import planes
+from proxyimg_codec.texture import planes, registered_model
+from proxyimg_codec.texture.grid import Grid
 from proxyimg_codec.texture.implicit import Box
 from proxyimg_codec.texture.latents import Latents
 from proxyimg_codec.texture.occlusion import Occlusion
@@ -51,6 +52,7 @@ def coded(
     shifts: tuple[int, ...] | None = None,
     grey: int = 0,
     large: Sequence[int] = (),
+    model: int = 2,
 ) -> Planes:
     """Planes of random latents.
 
@@ -66,15 +68,16 @@ def coded(
         shifts: Shifts of the scale index: luma and chroma of each level.
         grey: Number of the finest levels without chroma.
         large: Latents in the middle of level 1, from the left, channel by channel.
+        model: Number of the registered model.
     """
-    columns, rows = (-(-v >> levels) for v in size)
+    grid = Grid(size, levels, registered_model.registration(model).padded)
     most = max(round(60 * 2 ** (levels - step / 64)), 1)
-    lowest = n.integers(-most, most, (3, rows, columns))
+    lowest = n.integers(-most, most, (3, *grid.at(levels)))
     lowest[1:] //= 4 if components == 3 else most + 1
     lowest[1:] *= components == 3
     found = []
     for level in range(1, levels + 1):
-        shape = 9, rows << (levels - level), columns << (levels - level)
+        shape = 9, *grid.at(level)
         values = n.integers(-reach, reach, shape) * n.integers(0, 1, shape)
         if components == 1 or level <= grey:
             values[3:] = 0
@@ -83,7 +86,7 @@ def coded(
                 values[k % 9, shape[1] // 2, k] = value
         found.append(values.astype(np.int32))
     latents = Latents(tuple(found), lowest.astype(np.int32))
-    return planes.encoded(latents, size, step, cells, cell, components, 1, shifts)
+    return planes.encoded(latents, size, step, cells, cell, components, model, shifts)
 
 
 def view(
@@ -134,6 +137,41 @@ def _pyramid_grey_alpha(n: Numbers) -> Picture:
 @_case("A size that no power of two divides", "pyramid: size")
 def _pyramid_odd(n: Numbers) -> Picture:
     return one(view(coded(n, (13, 7), levels=3)))
+
+
+@_case("Levels that end on even and on odd samples, down and across", "pyramid: size",
+       renders=[WHOLE, {"region": [11, 6, 18, 17]}])  # fmt: skip
+def _pyramid_odd_levels(n: Numbers) -> Picture:
+    return one(view(coded(n, (29, 23), levels=4)))
+
+
+@_case("An even number of rows of which a level has an odd one, and columns the other way round",
+       "pyramid: size", "pyramid: components")  # fmt: skip
+def _pyramid_odd_below(n: Numbers) -> Picture:
+    return one(view(coded(n, (19, 26), levels=3, components=1)))
+
+
+@_case("Large latents at the end of odd rows and columns", "pyramid: size", "pyramid: raw bits")
+def _pyramid_odd_large(n: Numbers) -> Picture:
+    return one(view(coded(n, (15, 11), levels=2, step=0, reach=200, shifts=(7, 7, 7, 7))))
+
+
+@_case("Padded planes of model 1", "pyramid: padded")
+def _pyramid_padded(n: Numbers) -> Picture:
+    return one(view(coded(n, (13, 7), levels=3, model=1)))
+
+
+@_case("Padded planes of model 1 with cells without latents", "pyramid: padded", "pyramid: support")
+def _pyramid_padded_support(n: Numbers) -> Picture:
+    cells = n.integers(0, 2, planes.cells_of((21, 15), 2)) > 0
+    return one(view(coded(n, (21, 15), levels=3, cell=2, cells=cells, model=1)))
+
+
+@_case("Grey padded planes with alpha, beside those of another model", "pyramid: padded",
+       "pyramid: alpha")  # fmt: skip
+def _pyramid_padded_alpha(n: Numbers) -> Picture:
+    colour = coded(n, (17, 11), model=1)
+    return one(view(colour, alpha=coded(n, (17, 11), components=1)), opaque=False)
 
 
 @_case("One level", "pyramid: levels")

@@ -36,6 +36,11 @@ def _version_0_3(n: Numbers) -> bytes:
     return with_maps(to_bytes(layered(n)), (0, 3), without=["LAYR"])
 
 
+@_case("A file of version 0.9", "file: version")
+def _version_0_9(n: Numbers) -> bytes:
+    return write(read(to_bytes(layered(n))), (0, 9))
+
+
 @_case("A file of version 0.2 with arrays", "file: version", "fields: maps")
 def _arrays_0_2(n: Numbers) -> bytes:
     return write(read(to_bytes(layered(n))), (0, 2))

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from ...texture import planes as coded
-from ...texture.latents import Latents, support_at
+from ...texture.grid import Grid, by_channel
+from ...texture.latents import Latents
 from ...texture.network import Floats
 from ...texture.planes import Planes
 from . import refine
@@ -21,7 +22,7 @@ from .refine import Target
 from .shifts import Sample, best_shift
 from .window import Window
 
-NUMBER = 1
+NUMBER = 2
 """Number of the registered model that is used."""
 
 CELL = 3
@@ -123,9 +124,10 @@ class _Job:
     """Latents of a raster that are being refined.
 
     Attributes:
-        picture: [1, 3, rows, columns] samples, padded to a multiple of 2**`count`.
-        weight: [1, 1, rows, columns] weights, 0 in the padding; None = 1.
-        support: For each level a mask [1, 9, h, w], 0 for latents that must be 0; None = all 1.
+        picture: [1, 3, rows, columns] samples.
+        weight: [1, 1, rows, columns] weights; None = 1.
+        support: For each level, then for the lowest planes, a mask [1, channels, h, w], 0 for
+            latents that must be 0; None = all 1.
         latents: Latents of levels 1, 2, ..., then the lowest planes.
         shifts: Shifts of the scale index.
         count: Number of levels.
@@ -135,50 +137,41 @@ class _Job:
         self.model, self.raster, self.step_index = model, raster, step
         self.step = torch.tensor([2.0 ** (step / 64)])
         self.count = levels_for(raster.size)
-        columns, rows = (-(-n >> self.count) << self.count for n in raster.size)
-        width, height = raster.size
-        edges = ((0, rows - height), (0, columns - width))
-        padded = np.pad(raster.samples, (*edges, (0, 0)), mode="symmetric")
-        self.picture = _tensor(padded.transpose(2, 0, 1))
-        weight = np.ones((height, width), np.float32) if raster.weight is None else raster.weight
-        even = raster.weight is None and padded.shape == raster.samples.shape
-        self.weight = None if even else _tensor(np.pad(weight, edges)[None])
+        self.picture = _tensor(raster.samples.transpose(2, 0, 1))
+        self.weight = None if raster.weight is None else _tensor(raster.weight[None])
         self.support = self._support()
         self.latents = self._analysed()
         self.shifts = self._shifts()
 
     def _support(self) -> list[Tensor] | None:
         r = self.raster
-        padded = self.picture.shape[2:] != r.samples.shape[:2]
-        if r.cells is None and not r.grey and not padded:
+        unit = 1 << self.count
+        if r.cells is None and not r.grey and r.size[0] % unit == r.size[1] % unit == 0:
             return None
         cells = np.ones(coded.cells_of(r.size, CELL), bool) if r.cells is None else r.cells
         masks = []
         for level in range(1, self.count + 1):
-            at = support_at(cells, CELL, r.size, level, self.count)
-            mask = np.repeat(at[None], 9, 0)
+            mask = by_channel(Grid(r.size, self.count).bands(cells, CELL, level))
             mask[3:] &= not r.grey
             masks.append(_tensor(mask.astype(np.float32)))
-        return masks
+        lowest = np.ones((3, *mask.shape[1:]), np.float32)
+        lowest[1:] *= not r.grey
+        return [*masks, _tensor(lowest)]
 
     @torch.no_grad()
     def _analysed(self) -> list[Tensor]:
         """Latents by the analysis, window by window."""
-        unit = 1 << self.count
-        _, _, rows, columns = self.picture.shape
-        found = [
-            torch.zeros(1, 9, rows >> level, columns >> level) for level in range(1, self.count + 1)
-        ]
-        found.append(torch.zeros(1, 3, rows // unit, columns // unit))
+        grid = Grid(self.raster.size, self.count)
+        shapes = [grid.at(level) for level in self._depths()]
+        found = [torch.zeros(1, 9, *shape) for shape in shapes[:-1]]
+        found.append(torch.zeros(1, 3, *shapes[-1]))
         for box in self.windows(REACH):
             part = self.picture[:, :, box.outer[0], box.outer[1]]
             own = refine.shrunk(self.model.analyse(part, self.step, self.count), refine.DEAD_ZONE)
             self._keep(box, found, own)
-        if self.raster.grey:
-            found[-1][:, 1:] = 0
-        if self.support is not None:
-            found[:-1] = [y * mask for y, mask in zip(found[:-1], self.support, strict=True)]
-        return found
+        if self.support is None:
+            return found
+        return [y * mask for y, mask in zip(found, self.support, strict=True)]
 
     def _depths(self) -> list[int]:
         """Level of each array of latents; the lowest planes have the size of the last level."""

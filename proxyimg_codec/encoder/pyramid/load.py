@@ -46,7 +46,8 @@ def load(number: int) -> Model:
             causal[:, :, dy + 2, dx + 2] = taps[:, :, i]
         own["causal"] = causal
         state |= {f"levels.{k}.{name}": value for name, value in own.items()}
-    file = resources.files("proxyimg_codec.models").joinpath(f"pyramid-{number}-analysis.npz")
+    name = f"{registry.registration(number).file}-analysis.npz"
+    file = resources.files("proxyimg_codec.models").joinpath(name)
     with file.open("rb") as stream, np.load(stream) as analysis:
         state |= {k: torch.from_numpy(v.astype(np.float32)) for k, v in analysis.items()}
     model.load_state_dict(state)

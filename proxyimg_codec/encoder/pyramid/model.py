@@ -13,7 +13,15 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from .wavelet import analysis_weights, extended, reflected, synthesis_weights
+from .wavelet import (
+    Size,
+    analysis_weights,
+    extended,
+    merged,
+    missing,
+    reflected,
+    synthesis_weights,
+)
 
 LEVELS = 6
 """Most levels of a pyramid that is encoded."""
@@ -123,7 +131,7 @@ class Model(nn.Module):
         """Finds the latents of pictures, not rounded.
 
         Args:
-            picture: [B, 3, H, W] pictures in 0..255; H and W are multiples of 2**levels.
+            picture: [B, 3, H, W] pictures in 0..255.
             step: [B] quantization steps.
             levels: Number of levels.
 
@@ -170,20 +178,22 @@ class Model(nn.Module):
                 likely = Likelihood(likely.mean, scale)
             found.append(likely)
             if number > 1:
-                low = plain_synthesis(low, y)
+                low = plain_synthesis(low, y, latents[number - 2].shape[2:])
             parent = y
         return found[::-1]
 
-    def synthesise(self, latents: list[Tensor], step: Tensor) -> Tensor:
-        """Pictures [B, 3, H, W] of latents, in 0..255, neither rounded nor clipped.
+    def synthesise(self, latents: list[Tensor], step: Tensor, size: Size) -> Tensor:
+        """Pictures [B, 3, *size] of latents, in 0..255, neither rounded nor clipped.
 
         `latents` and `step` are those of `likelihoods`.
         """
+        sizes = [size, *(y.shape[2:] for y in latents)]
         q = log_step(step)
         low = latents[-1]
         for number in range(len(latents) - 1, 0, -1):
             level = self.level(number)
-            low = level.synthesise(low, latents[number - 1] * level.gains(q), q)
+            high = latents[number - 1] * level.gains(q)
+            low = level.synthesise(low, high, q, sizes[number - 1])
         return torch.einsum("ij,bjhw->bihw", self.to_colour, low) * step.view(-1, 1, 1, 1) + 128
 
 
@@ -195,15 +205,16 @@ def log_step(step: Tensor) -> Tensor:
 _PLAIN: dict[torch.dtype, Tensor] = {}
 
 
-def plain_synthesis(low: Tensor, high: Tensor) -> Tensor:
-    """Next finer planes [B, 3, 2h, 2w] by the plain CDF 9/7 wavelet, for the context network.
+def plain_synthesis(low: Tensor, high: Tensor, size: Size) -> Tensor:
+    """Next finer planes [B, 3, *size] by the plain CDF 9/7 wavelet, for the context network.
 
     Args:
         low: [B, 3, h, w] planes.
         high: [B, 9, h, w] latents.
+        size: Rows and columns of the finer planes.
     """
     weights = _PLAIN.setdefault(low.dtype, synthesis_weights().to(low.dtype))
-    return F.pixel_shuffle(F.conv2d(extended(low, high), weights), 2)
+    return merged(F.conv2d(extended(low, high, size), weights), size)
 
 
 class Level(nn.Module):
@@ -259,25 +270,25 @@ class Level(nn.Module):
         return self.gains(log_step(step))
 
     def analyse(self, low: Tensor, q: Tensor) -> tuple[Tensor, Tensor]:
-        """Splits planes [B, 3, 2h, 2w] into coarser planes [B, 3, h, w] and bands [B, 9, h, w]."""
-        cells = F.pixel_unshuffle(low, 2)
-        weights = self.analysis_base + self.analysis_delta
-        linear = F.conv2d(F.pixel_unshuffle(reflected(low, 4), 2), weights)
+        """Splits planes [B, 3, H, W] into coarser planes [B, 3, h, w] and bands [B, 9, h, w]."""
+        wide = F.pixel_unshuffle(reflected(low, 4), 2)
+        cells = wide[:, :, 2:-2, 2:-2]
+        linear = F.conv2d(wide, self.analysis_base + self.analysis_delta)
         parts = cells.view(cells.shape[0], 3, 4, *cells.shape[2:])
         parts = (parts - parts.mean(2, keepdim=True)).flatten(1, 2)
         out = linear + self.analysis(soft(parts), q, self.fast)
-        return out[:, :3], out[:, 3:]
+        return out[:, :3], out[:, 3:] * missing(out[:, 3:], low.shape[2:])
 
-    def synthesise(self, low: Tensor, high: Tensor, q: Tensor) -> Tensor:
-        """Merges planes [B, 3, h, w] and bands [B, 9, h, w] into finer planes [B, 3, 2h, 2w].
+    def synthesise(self, low: Tensor, high: Tensor, q: Tensor, size: Size) -> Tensor:
+        """Merges planes [B, 3, h, w] and bands [B, 9, h, w] into finer planes [B, 3, *size].
 
         Bands are latents times gains.
         """
         delta = eight_bit(self.synthesis_delta) if self.integer else self.synthesis_delta
-        linear = F.conv2d(extended(low, high), self.synthesis_base + delta)
+        linear = F.conv2d(extended(low, high, size), self.synthesis_base + delta)
         inputs = torch.cat([soft(high_pass(low)), soft(high)], 1)
         change = self.synthesis(inputs, q, self.fast, self.integer)
-        return F.pixel_shuffle(linear + change, 2)
+        return merged(linear + change, size)
 
     def likelihood(self, low: Tensor, parent: Tensor, y: Tensor, q: Tensor) -> Likelihood:
         """Finds the distributions of latents by the context network.

@@ -31,10 +31,10 @@ class Target(NamedTuple):
     """Target of refinement: pictures that latents should show, and restrictions on the latents.
 
     Attributes:
-        picture: [B, 3, H, W] pictures in 0..255; H and W are multiples of 2**levels.
+        picture: [B, 3, H, W] pictures in 0..255.
         weight: [B, 1, H, W] weights of the squared errors of samples; None = 1.
-        support: For each level a float mask [1, 9, h, w], 0 for latents that must be 0, else 1;
-            None = all 1.
+        support: For each level, then for the lowest planes, a float mask [1, channels, h, w], 0 for
+            latents that must be 0, else 1; None = all 1.
         free: For each level, then for the lowest planes, a bool mask of the latents that may
             change; None = all.
         step: [B] quantization steps.
@@ -129,7 +129,7 @@ def cost(model: Model, target: Target, latents: Sequence[Tensor], smooth: bool =
     for y, p, mask in zip(latents, likely, masks, strict=False):
         own = count(y, *p)
         spent = spent + (own if mask is None else own * mask).sum((1, 2, 3))
-    shown = model.synthesise(list(latents), target.step)
+    shown = model.synthesise(list(latents), target.step, target.picture.shape[2:])
     if target.similarity is not None:
         weight = 1.0 if target.weight is None else target.weight
         alike = ms_ssim(shown * weight, target.picture * weight)
@@ -185,7 +185,7 @@ def held(latents: Sequence[Tensor], fixed: Sequence[Tensor], target: Target) -> 
     if target.free is not None:
         out = [torch.where(m, y, f) for y, f, m in zip(out, fixed, target.free, strict=True)]
     if target.support is not None:
-        out[:-1] = [y * mask for y, mask in zip(out[:-1], target.support, strict=True)]
+        out = [y * mask for y, mask in zip(out, target.support, strict=True)]
     return out
 
 
@@ -220,7 +220,9 @@ def improved(
         if turn == rounds:
             break
         slopes = torch.autograd.grad(total, ys)
-        now = held(moved(model, target.step, now, spent.likely, slopes, random), first, target)
+        # The analysis rounds the lowest planes one by one, which a smooth border may show.
+        found = moved(model, target.step, now, spent.likely, slopes, random, turn == 0)
+        now = held(found, first, target)
         tick()
     return best
 
@@ -228,7 +230,7 @@ def improved(
 @torch.no_grad()
 def moved(
     model: Model, step: Tensor, latents: Sequence[Tensor], likely: Sequence[Likelihood],
-    slopes: Sequence[Tensor], random: torch.Generator,
+    slopes: Sequence[Tensor], random: torch.Generator, settle: bool,
 ) -> list[Tensor]:  # fmt: skip
     """Makes one round of moves of integer latents by one.
 
@@ -239,10 +241,11 @@ def moved(
     Args:
         model: The model.
         step: [B] quantization steps.
-        latents: Integer latents of levels 1, 2, ..., then the lowest planes, which do not move.
+        latents: Integer latents of levels 1, 2, ..., then the lowest planes.
         likely: Distributions of the latents.
         slopes: Derivatives of the total cost by the latents.
         random: Generator that chooses the latents that move.
+        settle: Whether the lowest planes move too, whose values all count as equally cheap.
     """
     out = list(latents)
     for k, p in enumerate(likely):
@@ -255,4 +258,8 @@ def moved(
         change = torch.where(up < down, 1.0, -1.0)
         gains = torch.minimum(up, down) < -1e-3
         out[k] = y + change * (gains & (torch.rand(y.shape, generator=random) < MOVING))
+    if settle:
+        lowest, slope = latents[-1], slopes[-1]
+        some = torch.rand(lowest.shape, generator=random) < MOVING
+        out[-1] = lowest - torch.sign(slope) * ((slope.abs() > 1 + 1e-3) & some)
     return out

@@ -5,8 +5,13 @@ from __future__ import annotations
 import numpy as np
 import torch
 from torch import Tensor
+from torch.nn import functional as F
 
-from ...texture.synthesis import BANDS, mirrored_indices, wavelet
+from ...texture.grid import BANDS, mirrored_indices
+from ...texture.synthesis import wavelet
+
+Size = tuple[int, ...]
+"""Rows and columns of planes."""
 
 # Cohen, Daubechies, Feauveau 1992; Antonini et al. 1992, table II, orthonormal scaling: halves of
 # the analysis filters.
@@ -45,37 +50,48 @@ def analysis_weights() -> Tensor:
 
 
 def reflected(x: Tensor, reach: int) -> Tensor:
-    """Extends planes [B, C, h, w] by `reach` samples on each side, mirrored as often as needed."""
+    """Extends planes [B, C, h, w] by `reach` samples on each side, mirrored as often as needed.
+
+    Where h or w is odd, one more is added below or on the right.
+    """
     for dim in (2, 3):
         n = x.shape[dim]
         period = max(2 * n - 2, 1)
-        index = torch.arange(-reach, n + reach) % period
+        index = torch.arange(-reach, n + n % 2 + reach) % period
         x = x.index_select(dim, torch.where(index < n, index, period - index))
     return x
 
 
-def _extend(x: Tensor, dim: int, high: int) -> Tensor:
-    """Extends a dimension by two samples at each end, symmetrically, as the decoder does.
-
-    Args:
-        x: Tensor to extend.
-        dim: The dimension.
-        high: Whether it is that of a high-pass band, which has another symmetry.
-    """
-    return x.index_select(dim, torch.from_numpy(mirrored_indices(x.shape[dim], bool(high))))
-
-
-def extended(low: Tensor, high: Tensor) -> Tensor:
+def extended(low: Tensor, high: Tensor, size: Size) -> Tensor:
     """Joins planes and bands, extended by two samples on each side, each by its own symmetry.
 
     Args:
         low: [B, 3, h, w] planes.
         high: [B, 9, h, w] bands.
+        size: Rows and columns of the finer planes that these make, 2 h or 2 h - 1 and so on.
 
     Returns:
         [B, 12, h + 4, w + 4]: planes, then the bands ordered by band, then colour.
     """
-    parts = [_extend(_extend(low, 3, 0), 2, 0)]
+
+    def extend(x: Tensor, *ways: int) -> Tensor:
+        for dim, n, high in zip((2, 3), size, ways, strict=True):
+            x = x.index_select(dim, torch.from_numpy(mirrored_indices(n, bool(high))))
+        return x
+
+    parts = [extend(high[:, band::3], *ways) for band, ways in enumerate(BANDS)]
+    return torch.cat([extend(low, 0, 0), *parts], 1)
+
+
+def merged(cells: Tensor, size: Size) -> Tensor:
+    """Planes [B, C, *size] of which `cells` [B, 4 C, h, w] has 2 x 2 samples a position."""
+    return F.pixel_shuffle(cells, 2)[:, :, : size[0], : size[1]]
+
+
+def missing(high: Tensor, size: Size) -> Tensor:
+    """Mask [1, 9, h, w] of bands [B, 9, h, w]: 0 for those that planes of `size` do not have."""
+    mask = torch.ones(1, 3, *high.shape[2:])
     for band, (v, h) in enumerate(BANDS):
-        parts.append(_extend(_extend(high[:, band::3], 3, h), 2, v))
-    return torch.cat(parts, 1)
+        mask[:, band, size[0] // 2 :] *= 1 - v
+        mask[:, band, :, size[1] // 2 :] *= 1 - h
+    return mask.repeat(1, 3, 1, 1)

@@ -48,14 +48,15 @@ class Window(NamedTuple):
     def at(self, level: int, inner: bool = False) -> tuple[slice, slice]:
         """Rows and columns of latents of a level that the window sees, or only those `inner`."""
         rows, columns = (
-            slice(s.start >> level, s.stop >> level) for s in (self.inner if inner else self.outer)
+            slice(s.start >> level, -(-s.stop >> level))
+            for s in (self.inner if inner else self.outer)
         )
         return rows, columns
 
     def inside(self, level: int) -> tuple[slice, slice]:
         """Rows and columns of the inner part, among the latents of a level that the window sees."""
         rows, columns = (
-            slice((i.start - o.start) >> level, (i.stop - o.start) >> level)
+            slice((i.start - o.start) >> level, -(-(i.stop - o.start) >> level))
             for i, o in zip(self.inner, self.outer, strict=True)
         )
         return rows, columns

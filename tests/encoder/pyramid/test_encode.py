@@ -255,7 +255,7 @@ def test_contradictions(wrong):
 
 def test_registered_weights_are_what_the_specification_says():
     files = Path(registered_model.__file__).parents[1] / "models"
-    for number, digest in registered_model.REGISTERED.items():
-        data = (files / f"pyramid-{number}.bin").read_bytes()
-        assert hashlib.sha256(data).hexdigest() == digest
+    for entry in registered_model.REGISTERED.values():
+        data = (files / f"{entry.file}.bin").read_bytes()
+        assert hashlib.sha256(data).hexdigest() == entry.digest
         assert len(data) <= 250_000

@@ -12,6 +12,7 @@ from proxyimg_codec.encoder.pyramid.model import LEVELS, Model, plain_synthesis
 from proxyimg_codec.encoder.pyramid.similarity import ms_ssim
 from proxyimg_codec.entropy import laplace
 from proxyimg_codec.texture import context, registered_model, synthesis
+from proxyimg_codec.texture.grid import Grid
 from proxyimg_codec.texture.latents import Latents
 from proxyimg_codec.texture.planes import encoded
 
@@ -38,9 +39,9 @@ def picture(height=128, width=192):
     return torch.from_numpy(np.stack(planes).astype(np.float32))[None].clamp(0, 255)
 
 
-def latents_of(net, step=STEP):
+def latents_of(net, size=(128, 192)):
     with torch.no_grad():
-        return [torch.round(y) for y in net.analyse(picture(), step_of(step), 4)]
+        return [torch.round(y) for y in net.analyse(picture(*size), step_of(STEP), 4)]
 
 
 def step_of(index):
@@ -52,40 +53,46 @@ def whole(latents):
     return Latents(tuple(arrays[:-1]), arrays[-1])
 
 
-def test_untrained_transform_reconstructs_perfectly():
+@pytest.mark.parametrize("size", [(128, 192), (127, 193), (50, 99), (33, 17), (2, 5), (1, 70)])
+def test_untrained_transform_reconstructs_perfectly(size):
     net = Model()
     net.set_mode(fast=False)
+    shown = picture(*size)
     with torch.no_grad():
-        back = net.synthesise(net.analyse(picture(), step_of(256), LEVELS - 1), step_of(256))
-    assert (back - picture()).abs().max() < 1e-3
+        found = net.analyse(shown, step_of(256), LEVELS - 1)
+        back = net.synthesise(found, step_of(256), size)
+    assert (back - shown).abs().max() < 1e-3
 
 
-def test_synthesis_is_the_decoders(exact):
-    found = latents_of(exact)
+@pytest.mark.parametrize("size", [(128, 192), (125, 154)])
+def test_synthesis_is_the_decoders(exact, size):
+    found = latents_of(exact, size)
     with torch.no_grad():
-        ours = exact.synthesise(found, step_of(STEP))[0].permute(1, 2, 0).numpy()
+        ours = exact.synthesise(found, step_of(STEP), size)[0].permute(1, 2, 0).numpy()
     own = whole(found)
-    theirs = synthesis.samples(registered_model.registered(1), own.levels, own.lowest, STEP)
+    weights, grid = registered_model.registered(2), Grid(size[::-1], 4)
+    theirs = synthesis.samples(weights, grid, own.levels, own.lowest, STEP)
     assert np.abs(ours - theirs).max() < 0.01
 
 
 def test_bfloat16_hardly_changes_the_picture(shipped):
     found = latents_of(shipped)
     with torch.no_grad():
-        fast = shipped.synthesise(found, step_of(STEP))
+        fast = shipped.synthesise(found, step_of(STEP), (128, 192))
         shipped.set_mode(fast=False)
-        slow = shipped.synthesise(found, step_of(STEP))
+        slow = shipped.synthesise(found, step_of(STEP), (128, 192))
         shipped.set_mode(fast=True)
     assert (fast - slow).abs().max() < 1
 
 
-def test_plain_wavelet_is_the_decoders_within_its_rounding():
+@pytest.mark.parametrize("size", [(24, 32), (23, 31), (24, 31)])
+def test_plain_wavelet_is_the_decoders_within_its_rounding(size):
     rng = np.random.default_rng(3)
     low = rng.integers(-300, 300, (3, 12, 16)).astype(np.int32)
     high = rng.integers(-20, 20, (9, 12, 16)).astype(np.int32)
-    theirs = context.next_plain(low << 4, high) / 16
+    theirs = context.next_plain(low << 4, high, size) / 16
     tensors = (torch.from_numpy(a.astype(np.float32))[None] for a in (low, high))
-    ours = plain_synthesis(*tensors)[0].numpy()
+    ours = plain_synthesis(*tensors, size)[0].numpy()
     # Taps are rounded to 1/256.
     assert np.abs(ours - theirs).max() < 3
     assert np.abs(ours - theirs).mean() < 0.5
@@ -111,14 +118,14 @@ def test_context_network_is_the_decoders_up_to_rounding(exact):
     k = 2  # level 3: what its plain plane is made of is exact in both
     plain = own.lowest << 4
     for level in (4,):
-        plain = context.next_plain(plain, own.levels[level - 1])
+        plain = context.next_plain(plain, own.levels[level - 1], own.levels[k].shape[1:])
     recorder = Recorder()
-    support = np.ones(own.levels[k].shape[1:], bool)
-    coder = context.LevelCoder(registered_model.registered(1).context[k], STEP, False, (0, 0))
-    coder.code(recorder, plain, own.levels[k + 1], support, own.levels[k])
+    bands = np.full(own.levels[k].shape[1:], 7, np.uint8)
+    coder = context.LevelCoder(registered_model.registered(2).context[k], STEP, False, (0, 0))
+    coder.code(recorder, plain, own.levels[k + 1], bands, own.levels[k])
     mean = np.concatenate([m.reshape(-1, 3) for m in recorder.means[::2]])
     scale = np.concatenate([m.reshape(-1, 3) for m in recorder.scales[::2]])
-    order = [w.rows * support.shape[1] + w.columns for w in context.waves(support)]
+    order = [w.rows * bands.shape[1] + w.columns for w in context.waves(bands > 0)]
     at = np.concatenate(order)
     ours_mean = likely[k].mean[0, :3].reshape(3, -1).T.numpy()[at] * 16
     ours_scale = likely[k].log_scale[0, :3].reshape(3, -1).T.numpy()[at] * 8 + 32
