@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..io import xml
-from ..io.raster import encode_png
+from ..io.png import encode_png
 from ..limits import DEFAULT_LIMITS, Limits
 from ..model import Layer, Picture, Pictured
 from ..render.cache import Cache

@@ -20,8 +20,8 @@ from proxyimg_codec.encoder.settings import Settings
 from proxyimg_codec.export import openraster as export
 from proxyimg_codec.export.common import at_full_opacity
 from proxyimg_codec.io import xml
+from proxyimg_codec.io.png import encode_png
 from proxyimg_codec.io.psnr import psnr_8bit
-from proxyimg_codec.io.raster import encode_png
 from proxyimg_codec.limits import Limits
 from proxyimg_codec.render.quality import psnr
 from tests.support.pictures import icc, smooth
