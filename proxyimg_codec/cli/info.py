@@ -72,6 +72,7 @@ def describe(c: Container, size: int) -> dict[str, Any]:
         "groups": c.tree["groups"] if c.tree else [],
         "edits": [step.operation for step in c.history],
         "metadata": {name: len(block) for name, block in c.blocks.items()},
+        "cicp": dict(c.cicp) if c.cicp else None,
         "chunk_bytes": dict(c.sizes),
         "encoder": (c.info or {}).get("encoder"),
         "settings": settings(c),
