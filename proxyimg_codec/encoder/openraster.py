@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, LimitError, UnsupportedError
 from ..io import xml
+from ..io.color import COLOUR
 from ..io.raster import parse as parse_picture
 from ..limits import DEFAULT_LIMITS, Limits
 from .shapes.masks import unique_names
@@ -120,7 +121,7 @@ def read_openraster(data: bytes, name: str, limits: Limits = DEFAULT_LIMITS) -> 
         pixels += _png_pixels(png, where, limits)
         _check(limits, "output_pixels", pixels, f"{where}, with those behind it")
         picture = parse_picture(png, f"{where}: {source}")
-        blocks = blocks or {k: v for k, v in picture.blocks.items() if k == "icc"}
+        blocks = blocks or {k: v for k, v in picture.blocks.items() if k in COLOUR}
         placed = _clipped(replace(layer, name=unique, pixels=picture.pixels), width, height)
         if placed is None:
             left_out.append(unique)

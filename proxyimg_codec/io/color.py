@@ -52,6 +52,10 @@ _ROUNDING = 1e-3
 """Samples that a conversion puts outside 0..1 by no more than this are at its ends."""
 
 
+COLOUR = ("icc", "cicp")
+"""Blocks that say what colours pixels are."""
+
+
 @dataclass(frozen=True)
 class Colour:
     """Statement of a file about its colour. The first of these that is there counts.
@@ -279,7 +283,7 @@ def _mixed(inks: Pixels) -> Floats:
 
 def is_srgb(blocks: Mapping[str, bytes]) -> bool:
     """Whether pixels with these blocks are sRGB."""
-    return "icc" not in blocks and "cicp" not in blocks
+    return not any(name in blocks for name in COLOUR)
 
 
 def is_hdr(blocks: Mapping[str, bytes]) -> bool:
@@ -293,11 +297,11 @@ def to_srgb(pixels: Pixels, blocks: Mapping[str, bytes]) -> Floats:
     Of PQ and HLG, diffuse white (`REFERENCE_WHITE`) becomes 1, and brighter light is clipped.
 
     Args:
-        pixels: [H, W, 3] or, with straight alpha, [H, W, 4]; uint8, uint16, or float32 in 0..1.
+        pixels: [H, W, 1..4] uint8, uint16, or float32 in 0..1, with straight alpha.
         blocks: What they mean: ``icc`` and ``cicp``, of which the second counts.
 
     Returns:
-        float32 in 0..1 of the same shape.
+        float32 [H, W, 3] or, with alpha, [H, W, 4] in 0..1.
 
     Raises:
         UnsupportedError: The profile is damaged, or imagecodecs is not installed.
@@ -320,8 +324,10 @@ def to_linear(pixels: Pixels, blocks: Mapping[str, bytes]) -> Floats:
 
 def _converted(pixels: Pixels, blocks: Mapping[str, bytes], target: Callable[[], bytes]) -> Floats:
     """Pixels as float32 in the colours of a profile; alpha as it is."""
-    values, cicp = unit(pixels), blocks.get("cicp")
-    if cicp is not None:
+    values, cicp = unit(pixels), blocks.get("cicp", b"")
+    if _colours(values) == 1:
+        values = np.concatenate([np.repeat(values[..., :1], 3, axis=2), values[..., 1:]], axis=2)
+    if cicp_problem(cicp) is None:
         light = np.asarray(_LIGHT[cicp[1]](values[..., :3].astype(np.float64)), np.float32)
         colour = _transformed(light, _profile(PRIMARIES[cicp[0]], 1.0), target())
     else:
@@ -330,7 +336,11 @@ def _converted(pixels: Pixels, blocks: Mapping[str, bytes], target: Callable[[],
 
 
 def profile_of(cicp: bytes) -> bytes | None:
-    """ICC profile that says what ``cicp`` says; None for high dynamic range, which has none."""
-    if is_hdr({"cicp": cicp}):
+    """ICC profile that says what ``cicp`` says; None for high dynamic range, which has none.
+
+    Raises:
+        UnsupportedError: imagecodecs is not installed.
+    """
+    if is_hdr({"cicp": cicp}) or cicp_problem(cicp) is not None:
         return None
     return _profile(PRIMARIES[cicp[0]], None, cicp[1])

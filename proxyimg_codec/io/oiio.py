@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, UnsupportedError, UsageError
-from .color import ADOBE_RGB, SRGB, Colour, is_srgb, to_linear
+from .color import ADOBE_RGB, COLOUR, SRGB, Colour, is_srgb, to_linear
 
 Pixels = NDArray[Any]
 
@@ -199,7 +199,7 @@ def _channels(pixels: Pixels, spec: Any, type_: str) -> Pixels:
 
 
 def _colour(spec: Any, type_: str, floating: bool, name: str) -> Colour:
-    """What a file says about the meaning of its numbers."""
+    """Statement of a file about the meaning of its numbers."""
     icc, cicp = _icc(spec), spec.getattribute("CICP")
     if cicp is not None:
         # Whatever they were in the file: the reader gives RGB, over the full range.
@@ -279,7 +279,7 @@ def encode(kind: str, pixels: Pixels, blocks: Mapping[str, bytes]) -> tuple[byte
         form = {"uint8": "uint8", "uint16": "uint16", "float32": "float"}[str(pixels.dtype)]
         if kind in LINEAR:
             pixels, form = to_linear(pixels, blocks), "float" if form == "float" else "half"
-            blocks = {k: v for k, v in blocks.items() if k not in ("icc", "cicp")}
+            blocks = {k: v for k, v in blocks.items() if k not in COLOUR}
         spec = oiio.ImageSpec(width, height, channels, form)
         spec.attribute("oiio:UnassociatedAlpha", 1)
         if "icc" in blocks:

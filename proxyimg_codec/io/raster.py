@@ -84,8 +84,7 @@ def parse(data: bytes, name: str, *, frame: int | None = None, clip: bool = Fals
     if frame and more:
         if not 0 < frame <= len(more):
             raise InputError(f"{name}: --frame {frame}: it has {len(more) + 1} pictures, from 0")
-        found = parse(more[frame - 1], name, frame=0, clip=clip)
-        return replace(found, notes=(_which(frame, len(more) + 1), *found.notes))
+        return parse(more[frame - 1], name, frame=0, clip=clip)
     source = _source(data, name, frame)
     pixels, blocks, notes = color.adopt(source.pixels, source.colour)
     told = metadata.raw_blocks(data, source.frame)
@@ -93,15 +92,28 @@ def parse(data: bytes, name: str, *, frame: int | None = None, clip: bool = Fals
     if source.told and not told:
         notes.append("its metadata is left out: it is carried from JPEG, PNG, WebP and TIFF")
     count = source.frames + len(more)
-    if count > 1:
+    if count > 1 and frame is None:
         notes.insert(0, _which(source.frame, count))
     stated = exif.orientation(told.get("exif", b""))
     turned = _turn(pixels, source.orientation if stated is None else stated)
     return Picture(_clipped(turned, clip), {**metadata.upright(told), **blocks}, tuple(notes))
 
 
+def stripped(picture: Picture) -> Picture:
+    """Returns a picture without metadata, converted to sRGB if its colours are not.
+
+    Raises:
+        UnsupportedError: Its profile is damaged, or imagecodecs is not installed.
+    """
+    if color.is_srgb(picture.blocks):
+        return replace(picture, blocks={})
+    notes = (*picture.notes, "converted to sRGB, because its profile is stripped")
+    return Picture(color.to_srgb(picture.pixels, picture.blocks), {}, notes)
+
+
 def _which(frame: int, count: int) -> str:
-    return f"number {frame} of 0 to {count - 1} pictures is taken; --frame takes another"
+    return (f"it holds {count} pictures, of which number {frame} is taken, counted from 0; "
+            "--frame N takes another")  # fmt: skip
 
 
 def _clipped(pixels: Pixels, clip: bool) -> Pixels:
@@ -203,8 +215,8 @@ def write(
 def _encode(kind: str, pixels: Pixels, blocks: dict[str, bytes]) -> tuple[bytes, list[str]]:
     """A file of a type of OpenImageIO, and the names of blocks that it does not hold."""
     cicp = blocks.get("cicp")
-    holds = {k: v for k, v in blocks.items() if k not in ("icc", "cicp")}
-    said = {k: v for k, v in blocks.items() if k in ("icc", "cicp")}
+    holds = {k: v for k, v in blocks.items() if k not in color.COLOUR}
+    said = {k: v for k, v in blocks.items() if k in color.COLOUR}
     if cicp is not None and kind not in oiio.LINEAR:
         made = color.profile_of(cicp)
         said = {} if made is None else {"icc": made}

@@ -58,6 +58,14 @@ def unit(pixels: NDArray[Any]) -> Floats:
     return pixels.astype(np.float32) / np.float32(np.iinfo(pixels.dtype).max)
 
 
+def rounded(values: Floats, dtype: Any) -> NDArray[Any]:
+    """Returns float32 samples in 0..1 as uint8 or uint16, rounded, or as they are."""
+    if np.dtype(dtype).kind == "f":
+        return values
+    whole: NDArray[Any] = np.rint(values * np.float32(np.iinfo(dtype).max)).astype(dtype)
+    return whole
+
+
 def to_float(pixels: NDArray[Any]) -> tuple[Floats, int]:
     """Converts a picture to floating-point RGBA.
 
