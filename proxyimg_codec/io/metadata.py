@@ -1,4 +1,4 @@
-"""EXIF and XMP blocks of JPEG, PNG, WebP and TIFF files: found, set upright, and put in."""
+"""EXIF and XMP blocks of picture files: found, set upright, and put in."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import re
 import struct
 from collections.abc import Iterator, Mapping
 
-from . import exif, png
+from . import boxes, exif, png
 
 _JPEG_EXIF = b"Exif\0\0"
 _JPEG_XMP = b"http://ns.adobe.com/xap/1.0/\0"
@@ -28,7 +28,7 @@ def raw_blocks(data: bytes, number: int = 0) -> dict[str, bytes]:
         number: Number of the picture in a TIFF file, from 0.
     """
     blocks: dict[str, bytes] = {}
-    for name, block in (*_jpeg(data), *_png(data), *_webp(data)):
+    for name, block in (*_jpeg(data), *_png(data), *_webp(data), *boxes.blocks(data)):
         if block:
             blocks.setdefault(name, block)
     return blocks | exif.from_tiff(data, number)
@@ -133,7 +133,9 @@ def _upright_xmp(xmp: bytes) -> bytes:
 
 
 def embed(data: bytes, blocks: Mapping[str, bytes]) -> tuple[bytes, list[str]]:
-    """Puts the blocks ``exif`` and ``xmp`` into a JPEG, WebP or TIFF file without other changes.
+    """Puts the blocks ``exif`` and ``xmp`` into a file without changing its pixels.
+
+    JPEG, WebP, TIFF, JPEG XL and JPEG 2000 hold them.
 
     Args:
         data: The file, which has no such blocks, or ones to be replaced.
@@ -147,6 +149,8 @@ def embed(data: bytes, blocks: Mapping[str, bytes]) -> tuple[bytes, list[str]]:
         return _into_jpeg(data, told)
     if data[8:12] == b"WEBP":
         return (_into_webp(data, told) if told else data), []
+    if boxes.is_boxed(data):
+        return boxes.put(data, told), []
     try:
         return exif.into_tiff(data, told), []
     except ValueError:

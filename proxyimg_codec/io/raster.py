@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from . import color, exif, frames, metadata, oiio, png
+from . import boxes, color, exif, frames, metadata, oiio, png
 from .files import read_bytes, write_atomically
 from .samples import standard
 
@@ -90,12 +90,12 @@ def parse(data: bytes, name: str, *, frame: int | None = None, clip: bool = Fals
     told = metadata.raw_blocks(data, source.frame)
     notes += [f"its {kind} is left out" for kind in metadata.left_out(data)]
     if source.told and not told:
-        notes.append("its metadata is left out: it is carried from JPEG, PNG, WebP and TIFF")
+        notes.append("its metadata is left out: this type has it in a form that is not read")
     count = source.frames + len(more)
     if count > 1 and frame is None:
         notes.insert(0, _which(source.frame, count))
-    stated = exif.orientation(told.get("exif", b""))
-    turned = _turn(pixels, source.orientation if stated is None else stated)
+    stated = exif.orientation(told.get("exif", b"")) or source.orientation
+    turned = pixels if boxes.is_jpeg_xl(data) else _turn(pixels, stated)
     return Picture(_clipped(turned, clip), {**metadata.upright(told), **blocks}, tuple(notes))
 
 
@@ -183,8 +183,8 @@ def write(
         pixels: [H, W, 3] or, with straight alpha, [H, W, 4]; uint8, uint16, or float32 (only for
             NPY and types of OpenImageIO). OpenEXR, Radiance and PFM are written in linear light.
         blocks: What the pixels mean, and metadata: ``icc``, ``cicp``, ``exif`` and ``xmp``. PNG
-            holds all of it; JPEG, TIFF and WebP hold all but ``cicp``, for which they get a
-            profile.
+            holds all of it; JPEG, TIFF, WebP and JPEG XL hold all but ``cicp``, for which they get
+            a profile.
         suffix: Type of the file in place of the suffix of `path`, such as ``.png``.
 
     Returns:
