@@ -25,7 +25,6 @@ Chromaticities = tuple[float, ...]
 
 _D65, _C = (0.3127, 0.3290), (0.310, 0.316)
 SRGB: Chromaticities = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, *_D65)
-ADOBE_RGB: Chromaticities = (0.64, 0.33, 0.21, 0.71, 0.15, 0.06, *_D65)
 PRIMARIES: dict[int, Chromaticities] = {
     1: SRGB,
     4: (0.67, 0.33, 0.21, 0.71, 0.14, 0.08, *_C),
@@ -73,6 +72,9 @@ class Colour:
     inks: bool = False
     gamma: float | None = None
     chromaticities: Chromaticities = SRGB
+
+
+ADOBE_RGB = Colour(gamma=563 / 256, chromaticities=(0.64, 0.33, 0.21, 0.71, 0.15, 0.06, *_D65))
 
 
 def _bt709(v: Pixels) -> Pixels:

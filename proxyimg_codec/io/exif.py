@@ -43,6 +43,11 @@ def _order(data: bytes) -> str | None:
     return order if len(data) >= 10 else None
 
 
+def is_tiff(data: bytes) -> bool:
+    """Whether data is a TIFF structure: a file, or an EXIF block."""
+    return _order(data) is not None
+
+
 def _entries(data: bytes, order: str, start: int) -> list[tuple[int, int]]:
     """Tags of a directory, and where their entries of 12 bytes are; those that are there."""
     if start < 8 or start + 2 > len(data):
@@ -78,6 +83,15 @@ def orientation(exif: bytes) -> int | None:
     return None
 
 
+def is_adobe_rgb(exif: bytes) -> bool:
+    """Whether a block has the mark of Adobe RGB, index R03 (Exif 2.32, Annex A and DCF 2.0)."""
+    order = _order(exif)
+    found: Value | Directory = _directory(exif, order, _first(exif, order)) if order else {}
+    for tag in (_EXIF, _INTEROPERABILITY, 1):
+        found = found.get(tag, {}) if isinstance(found, dict) else {}
+    return isinstance(found, tuple) and found[2][:3] == b"R03"
+
+
 def upright(exif: bytes) -> bytes:
     """Sets the orientation of a block to 1, and drops the thumbnail of a picture that was turned.
 
@@ -89,10 +103,7 @@ def upright(exif: bytes) -> bytes:
     out, start = bytearray(exif), _first(exif, order)
     for tag, at in _entries(exif, order, start):
         if tag == ORIENTATION:
-            kind = struct.unpack_from(order + "H", exif, at + 2)[0]
-            form = kind if kind in _NUMBER else 3
-            value = struct.pack(order + _NUMBER[form], 1).ljust(4, b"\0")
-            out[at + 2 : at + 12] = struct.pack(order + "HI", form, 1) + value
+            out[at + 2 : at + 12] = struct.pack(order + "HIHH", 3, 1, 1, 0)
     (count,) = struct.unpack_from(order + "H", exif, start) if start + 2 <= len(exif) else (0,)
     link = start + 2 + 12 * count
     if turned and link + 4 <= len(exif):

@@ -6,14 +6,16 @@ the inks of a JPEG file in CMYK.
 
 from __future__ import annotations
 
+import contextlib
 import io
 import struct
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, UnsupportedError
+from ..errors import InputError, PxiError, UnsupportedError
 from . import png
 from .metadata import jpeg_segments, riff_chunks
 
@@ -43,16 +45,13 @@ def read(data: bytes, name: str, frame: int) -> tuple[Pixels, int]:
         InputError: The file is damaged, or has no such frame.
         UnsupportedError: Pillow is not installed.
     """
-    source = _opened(data, name)
-    try:
+    with _opened(data, name) as source:
         count = int(getattr(source, "n_frames", 1))
         if not 0 <= frame < count:
             many = "1 picture" if count == 1 else f"{count} pictures"
             raise InputError(f"{name}: --frame {frame}: it has {many}, from 0")
         source.seek(frame)
         pixels = np.asarray(source.convert("RGBA"))
-    except (OSError, SyntaxError, ValueError, EOFError, struct.error, MemoryError) as error:
-        raise InputError(f"{name}: damaged or truncated ({_line(error)})") from None
     return (pixels[..., :3] if (pixels[..., 3] == 255).all() else pixels), count
 
 
@@ -63,15 +62,13 @@ def inks(data: bytes, name: str) -> Pixels:
         InputError: The file is damaged.
         UnsupportedError: Pillow is not installed.
     """
-    source = _opened(data, name)
-    try:
+    with _opened(data, name) as source:
         return np.asarray(source.convert("CMYK"))
-    except (OSError, SyntaxError, ValueError) as error:
-        raise InputError(f"{name}: damaged or truncated ({_line(error)})") from None
 
 
-def _opened(data: bytes, name: str) -> Any:
-    """File opened by Pillow."""
+@contextlib.contextmanager
+def _opened(data: bytes, name: str) -> Iterator[Any]:
+    """File opened by Pillow, whose errors become `InputError`s."""
     try:
         from PIL import Image
     except ImportError:
@@ -79,14 +76,13 @@ def _opened(data: bytes, name: str) -> Any:
             "this file type needs Pillow: pip install 'proxyimg-codec[io]'"
         ) from None
     try:
-        return Image.open(io.BytesIO(data))
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
-        raise InputError(f"{name}: damaged or truncated ({_line(error)})") from None
-
-
-def _line(error: Exception) -> str:
-    lines = str(error).splitlines()
-    return lines[0] if lines else type(error).__name__
+        with Image.open(io.BytesIO(data)) as source:
+            yield source
+    except (PxiError, MemoryError):
+        raise
+    except Exception as error:  # of a damaged file any, such as IndexError
+        lines = str(error).splitlines() or [type(error).__name__]
+        raise InputError(f"{name}: damaged or truncated ({lines[0]})") from None
 
 
 def further_pictures(data: bytes) -> list[bytes]:

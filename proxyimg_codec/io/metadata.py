@@ -128,8 +128,17 @@ def upright(blocks: Mapping[str, bytes]) -> dict[str, bytes]:
     return {name: change.get(name, bytes)(block) for name, block in blocks.items()}
 
 
+_XMP_ORIENTATION = rb"""(tiff:Orientation(?:\s*=\s*["']|>)\s*)([1-8])"""
+
+
+def xmp_orientation(xmp: bytes) -> int | None:
+    """Orientation that an XMP packet states, 1..8; None if it states none."""
+    match = re.search(_XMP_ORIENTATION, xmp)
+    return None if match is None else int(match[2])
+
+
 def _upright_xmp(xmp: bytes) -> bytes:
-    return re.sub(rb"""(tiff:Orientation(?:\s*=\s*["']|>)\s*)[2-8]""", rb"\g<1>1", xmp)
+    return re.sub(_XMP_ORIENTATION, rb"\g<1>1", xmp)
 
 
 def embed(data: bytes, blocks: Mapping[str, bytes]) -> tuple[bytes, list[str]]:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, UnsupportedError, UsageError
-from .color import ADOBE_RGB, COLOUR, SRGB, Colour, is_srgb, to_linear
+from .color import COLOUR, SRGB, Colour, is_srgb, to_linear
 
 Pixels = NDArray[Any]
 
@@ -47,6 +47,7 @@ class Source:
         orientation: Orientation that the reader found, 1..8.
         frame: Number of the picture in the file, from 0.
         frames: Number of pictures in the file that can be chosen.
+        place: Number of the subimage of OpenImageIO.
         told: Whether the reader found EXIF, IPTC or XMP, wherever it was.
     """
 
@@ -55,6 +56,7 @@ class Source:
     orientation: int
     frame: int
     frames: int
+    place: int = 0
     told: bool = False
 
 
@@ -136,7 +138,7 @@ def _frames(source: Any) -> list[int]:
             found.append(number)
         number += 1
     _error(source)
-    return found or [0]
+    return found or [*range(number)]
 
 
 def _read(source: Any, name: str, frame: int | None) -> Source:
@@ -167,7 +169,7 @@ def _read(source: Any, name: str, frame: int | None) -> Source:
     return Source(
         _channels(pixels, spec, type_),
         _colour(spec, type_, pixels.dtype.kind == "f", name),
-        spec.get_int_attribute("Orientation", 1), frame, len(numbers), told,
+        spec.get_int_attribute("Orientation", 1), frame, len(numbers), numbers[frame], told,
     )  # fmt: skip
 
 
@@ -217,8 +219,7 @@ def _colour(spec: Any, type_: str, floating: bool, name: str) -> Colour:
     if space == "lin_rec709_scene":
         return Colour(gamma=1.0, chromaticities=chromaticities or SRGB)
     if space in _SRGB_NAMES or "CMYK" in space or space == "color separated":
-        r03 = spec.getattribute("Exif:InteroperabilityIndex") == "R03"
-        return Colour(gamma=2.19921875, chromaticities=ADOBE_RGB) if r03 else Colour()
+        return Colour()
     return _named(space, name)
 
 
@@ -282,6 +283,8 @@ def encode(kind: str, pixels: Pixels, blocks: Mapping[str, bytes]) -> tuple[byte
             blocks = {k: v for k, v in blocks.items() if k not in COLOUR}
         spec = oiio.ImageSpec(width, height, channels, form)
         spec.attribute("oiio:UnassociatedAlpha", 1)
+        if target.format_name() == "tiff":  # which would get the time of day
+            spec.attribute("DateTime", "2000:01:01 00:00:00")
         if "icc" in blocks:
             profile = np.frombuffer(blocks["icc"], np.uint8)
             spec.attribute("ICCProfile", oiio.TypeDesc(f"uint8[{len(profile)}]"), profile)

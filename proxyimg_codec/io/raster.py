@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import InputError, UnsupportedError
 from . import boxes, color, exif, frames, metadata, oiio, png
 from .files import read_bytes, write_atomically
 from .samples import standard
@@ -86,29 +86,43 @@ def parse(data: bytes, name: str, *, frame: int | None = None, clip: bool = Fals
             raise InputError(f"{name}: --frame {frame}: it has {len(more) + 1} pictures, from 0")
         return parse(more[frame - 1], name, frame=0, clip=clip)
     source = _source(data, name, frame)
-    pixels, blocks, notes = color.adopt(source.pixels, source.colour)
-    told = metadata.raw_blocks(data, source.frame)
-    notes += [f"its {kind} is left out" for kind in metadata.left_out(data)]
-    if source.told and not told:
-        notes.append("its metadata is left out: this type has it in a form that is not read")
+    told = metadata.raw_blocks(data, source.place)
+    colour, is_jpeg = source.colour, data[:2] == b"\xff\xd8"
+    # Many cameras say Adobe RGB by this mark alone.
+    if is_jpeg and colour == color.Colour() and exif.is_adobe_rgb(told.get("exif", b"")):
+        colour = color.ADOBE_RGB
+    pixels, blocks, notes = color.adopt(source.pixels, colour)
+    lost = metadata.left_out(data)
+    if source.told and not told and not lost:
+        lost = ["metadata in a form that is not read"]
+    notes += [f"{', '.join(lost)}: left out"] if lost else []
     count = source.frames + len(more)
     if count > 1 and frame is None:
         notes.insert(0, _which(source.frame, count))
-    stated = exif.orientation(told.get("exif", b"")) or source.orientation
-    turned = pixels if boxes.is_jpeg_xl(data) else _turn(pixels, stated)
+    turned = _turn(pixels, _orientation(data, told, source))
     return Picture(_clipped(turned, clip), {**metadata.upright(told), **blocks}, tuple(notes))
 
 
-def stripped(picture: Picture) -> Picture:
-    """Returns a picture without metadata, converted to sRGB if its colours are not.
+def _orientation(data: bytes, told: Mapping[str, bytes], source: oiio.Source) -> int:
+    """Orientation of a file by the first that states one: EXIF, XMP, or what its type has."""
+    if boxes.is_jpeg_xl(data):
+        return 1
+    if exif.is_tiff(data):
+        return source.orientation
+    stated = exif.orientation(told.get("exif", b""))
+    return stated or metadata.xmp_orientation(told.get("xmp", b"")) or source.orientation
 
-    Raises:
-        UnsupportedError: Its profile is damaged, or imagecodecs is not installed.
-    """
+
+def stripped(picture: Picture) -> Picture:
+    """Returns a picture without metadata, converted to sRGB if its colours are not and can be."""
     if color.is_srgb(picture.blocks):
         return replace(picture, blocks={})
-    notes = (*picture.notes, "converted to sRGB, because its profile is stripped")
-    return Picture(color.to_srgb(picture.pixels, picture.blocks), {}, notes)
+    try:
+        pixels: Pixels = color.to_srgb(picture.pixels, picture.blocks)
+        note = "converted to sRGB, because what says its colours is stripped"
+    except UnsupportedError as error:
+        pixels, note = picture.pixels, f"not converted to sRGB: {error}"
+    return Picture(pixels, {}, (*picture.notes, note))
 
 
 def _which(frame: int, count: int) -> str:
@@ -196,7 +210,7 @@ def write(
         UnsupportedError: The type is unknown, or OpenImageIO is missing.
     """
     kind = suffix or Path(path).suffix.lower()
-    blocks = dict(blocks or {})
+    blocks = metadata.upright(blocks or {})  # the pixels are, whatever these say [MET-6]
     lost = [*blocks]
     if kind == ".png":
         data, lost = png.encode_png(pixels, blocks), []
