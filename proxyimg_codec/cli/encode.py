@@ -170,6 +170,7 @@ def encoded(source: bytes, args: argparse.Namespace, settings: Any, bar: Bar) ->
     from ..encoder.import_layers import composite, encode_layers
     from ..encoder.openraster import is_openraster, read_openraster
     from ..encoder.shapes.masks import load_masks
+    from ..io.color import is_srgb
     from ..io.raster import parse, stripped
 
     seen = 0
@@ -185,6 +186,9 @@ def encoded(source: bytes, args: argparse.Namespace, settings: Any, bar: Bar) ->
         refuse_for_layers(args)
         layered = read_openraster(source, name)
         if args.strip:
+            if not is_srgb(layered.blocks) and not args.quiet:
+                print(f"pxi-encode: warning: {printable(name)}: without its profile its colours "
+                      "look wrong", file=sys.stderr)  # fmt: skip
             layered = replace(layered, blocks={})
         image, kept = encode_layers(layered, settings, progress)
         for layer in () if args.quiet else kept.left_out:
@@ -192,11 +196,11 @@ def encoded(source: bytes, args: argparse.Namespace, settings: Any, bar: Bar) ->
         return image, composite(layered)
     picture = parse(source, name, frame=args.frame, clip=args.tone == "clip")
     picture = stripped(picture) if args.strip else picture
-    for note in () if args.quiet else picture.notes:
-        print(f"pxi-encode: warning: {printable(name)}: {note}", file=sys.stderr)
     height, width = picture.pixels.shape[:2]
     masks = None if args.masks is None else load_masks(args.masks, width, height)
     image = encode(picture.pixels, settings, masks=masks, blocks=picture.blocks, progress=progress)
+    for note in () if args.quiet else picture.notes:
+        print(f"pxi-encode: warning: {printable(name)}: {note}", file=sys.stderr)
     return image, picture.pixels
 
 
