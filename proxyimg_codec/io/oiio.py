@@ -256,10 +256,10 @@ def encode(kind: str, pixels: Pixels, blocks: Mapping[str, bytes]) -> tuple[byte
     Args:
         kind: Suffix of the type, with the dot.
         pixels: As `raster.write` takes them; types of linear light are converted.
-        blocks: Metadata blocks, of which ``icc`` is written.
+        blocks: Metadata blocks, of which ``icc`` and ``cicp`` are written where the type has them.
 
     Returns:
-        The file, and whether it says or follows what ``icc`` says.
+        The file, and whether it says or follows what these say.
 
     Raises:
         UsageError: The type cannot hold these pixels.
@@ -288,6 +288,8 @@ def encode(kind: str, pixels: Pixels, blocks: Mapping[str, bytes]) -> tuple[byte
         if "icc" in blocks:
             profile = np.frombuffer(blocks["icc"], np.uint8)
             spec.attribute("ICCProfile", oiio.TypeDesc(f"uint8[{len(profile)}]"), profile)
+        if "cicp" in blocks:
+            spec.attribute("CICP", oiio.TypeDesc("int[4]"), tuple(blocks["cicp"]))
         if channels == 4 and target.format_name() in _PREMULTIPLIED:
             pixels = _associated(pixels)
         good = target.open(name, spec)
@@ -299,9 +301,17 @@ def encode(kind: str, pixels: Pixels, blocks: Mapping[str, bytes]) -> tuple[byte
         if back is None:
             problem = _error(target, oiio) or "unknown reason"
             raise UnsupportedError(f"{kind} cannot hold this picture: {problem}")
-        follows = is_srgb(blocks) or _icc(back.spec()) == blocks.get("icc")
+        follows = is_srgb(blocks) or _says(back.spec(), blocks)
         back.close()
         return Path(name).read_bytes(), follows
+
+
+def _says(spec: Any, blocks: Mapping[str, bytes]) -> bool:
+    """Whether a file that was written says the colour that the blocks say."""
+    cicp = spec.getattribute("CICP")
+    if "cicp" in blocks and cicp is not None:
+        return bytes(tuple(cicp)[:2]) == blocks["cicp"][:2]
+    return "icc" in blocks and _icc(spec) == blocks["icc"]
 
 
 def _loses_bits(wanted: str, got: str) -> bool:

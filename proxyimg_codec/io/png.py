@@ -20,6 +20,9 @@ SIGNATURE = b"\x89PNG\r\n\x1a\n"
 XMP = "XML:com.adobe.xmp"
 """Keyword of the text that is an XMP packet."""
 
+_READ = (XMP, *(f"Raw profile type {name}" for name in ("exif", "xmp", "APP1", "icc", "icm")))
+"""Keywords of texts that are read."""
+
 _TEXT_MAX = 1 << 26
 """Most bytes of a compressed text or profile that are read."""
 
@@ -45,7 +48,10 @@ def chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
 
 
 def texts(data: bytes) -> dict[str, bytes]:
-    """Texts of a PNG file by keyword, decompressed; of several with a keyword the first."""
+    """Texts of a PNG file by keyword, decompressed; of several with a keyword the first.
+
+    Those that are neither XMP nor raw profiles are empty here.
+    """
     found: dict[str, bytes] = {}
     for kind, body in chunks(data):
         keyword, _, rest = body.partition(b"\0")
@@ -56,7 +62,10 @@ def texts(data: bytes) -> dict[str, bytes]:
             rest = rest[1:]
         elif kind != b"tEXt":
             continue
-        found.setdefault(keyword.decode("latin-1"), _inflated(rest) if packed else rest)
+        name = keyword.decode("latin-1")
+        if name not in found:
+            read = rest if name in _READ else b""
+            found[name] = _inflated(read) if packed else read
     return found
 
 

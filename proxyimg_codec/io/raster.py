@@ -146,7 +146,7 @@ def _source(data: bytes, name: str, frame: int | None) -> oiio.Source:
         if frame is not None and not 0 <= frame < count:
             raise InputError(f"{name}: --frame {frame}: it has 1 picture, from 0")
         oiio.import_oiio()
-        found = oiio.read(png.checked(data, name), "a.png")
+        found = oiio.read(png.checked(data, name), name)
         return replace(found, colour=png.colour(data), frames=count)
     found = oiio.read(data, name, frame)
     if metadata.is_cut_jpeg(data):
@@ -233,12 +233,10 @@ def _encode(kind: str, pixels: Pixels, blocks: dict[str, bytes]) -> tuple[bytes,
     said = {k: v for k, v in blocks.items() if k in color.COLOUR}
     if cicp is not None and kind not in oiio.LINEAR:
         made = color.profile_of(cicp)
-        said = {} if made is None else {"icc": made}
+        said = {"cicp": cicp} if made is None else {"cicp": cicp, "icc": made}
     data, follows = oiio.encode(kind, pixels, said)
     data, lost = metadata.embed(data, holds)
-    if not follows or (cicp is not None and not said):
-        lost += ["icc" if cicp is None else "cicp"]
-    return data, lost
+    return data, lost if follows else [*lost, "icc"]
 
 
 def _losses(kind: str, lost: list[str]) -> list[str]:
