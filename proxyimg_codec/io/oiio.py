@@ -100,7 +100,8 @@ def read(data: bytes, name: str, frame: int | None = None) -> Source:
     wanted.attribute("oiio:UnassociatedAlpha", 1)
     # OpenImageIO finds the reader of a type by trying. All readers work on files, but not all on
     # memory.
-    with tempfile.NamedTemporaryFile(suffix=Path(name).suffix[:16]) as file:
+    hint = Path(name).suffix if name.isascii() and name.isprintable() else ""
+    with tempfile.NamedTemporaryFile(suffix=hint[:16]) as file:
         file.write(data)
         file.flush()
         source = oiio.ImageInput.open(file.name, wanted)
@@ -266,6 +267,8 @@ def encode(kind: str, pixels: Pixels, blocks: Mapping[str, bytes]) -> tuple[byte
         UnsupportedError: The type is unknown, or OpenImageIO is missing.
     """
     oiio = import_oiio()
+    if not kind.isascii():  # OpenImageIO takes no names that are not UTF-8
+        raise UnsupportedError(f"files of type {kind} cannot be written")
     if not kind:
         raise UsageError("the output has no suffix; name it .png, .jpg, .tif or the like")
     with tempfile.TemporaryDirectory() as folder:

@@ -84,6 +84,8 @@ def test_png_colours_come_through(through, tool, tmp_path, cicp):
     assert json.loads(tool("info", tmp_path / "out.pxi", "--json").out)["cicp"] == {
         "primaries": cicp[0], "transfer": cicp[1],
     }  # fmt: skip
+    said = f"colour: primaries {cicp[0]}, transfer {cicp[1]} of H.273"
+    assert said in tool("info", tmp_path / "out.pxi").out.decode()
     ran = tool("decode", tmp_path / "out.pxi", tmp_path / "out.png", "-f")
     assert "warning" not in ran.err
     assert read(tmp_path / "out.png").blocks == {"cicp": cicp}

@@ -12,7 +12,7 @@ import pytest
 from proxyimg_codec.errors import InputError, UnsupportedError, UsageError
 from proxyimg_codec.io.metadata import is_cut_jpeg, raw_blocks, upright
 from proxyimg_codec.io.png import encode_png
-from proxyimg_codec.io.raster import read, write
+from proxyimg_codec.io.raster import parse, read, write
 from tests.support.pictures import icc
 
 oiio = pytest.importorskip("OpenImageIO")
@@ -354,6 +354,13 @@ def test_further_channels_are_left_out(tmp_path):
     pixels = noise(5)
     pixels[..., 3] = 255
     np.testing.assert_array_equal(read(save(tmp_path / "a.tif", pixels)).pixels, pixels[..., :4])
+
+
+@pytest.mark.parametrize("name", ["a.\0png", "a." + "x" * 300, "a.\u732b", "a.\udcff", "a.\n", "-"])
+def test_names_are_for_messages_and_may_be_any(name):
+    np.testing.assert_array_equal(parse(encode_png(noise(3)), name).pixels, noise(3))
+    with pytest.raises(InputError):
+        parse(b"no picture", name)
 
 
 @pytest.mark.parametrize("name", ["a.jpg", "a.dat", "a"])
