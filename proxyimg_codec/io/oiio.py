@@ -49,6 +49,7 @@ class Source:
         frames: Number of pictures in the file that can be chosen.
         place: Number of the subimage of OpenImageIO.
         told: Whether the reader found EXIF, IPTC or XMP, wherever it was.
+        mixed: Whether the file has inks, and the reader has made RGB of them.
     """
 
     pixels: Pixels
@@ -58,6 +59,7 @@ class Source:
     frames: int
     place: int = 0
     told: bool = False
+    mixed: bool = False
 
 
 def import_oiio() -> Any:
@@ -167,10 +169,14 @@ def _read(source: Any, name: str, frame: int | None) -> Source:
         raise InputError(f"{name}: not a two-dimensional picture")
     type_ = source.format_name()
     told = any(a.name.startswith(("Exif:", "GPS:", "IPTC:", "xmp:")) for a in spec.extra_attribs)
+    spaces = (spec.getattribute(f"{kind}:ColorSpace") for kind in ("jpeg", "tiff", "oiio", "psd"))
+    inks = any(str(space) in ("CMYK", "YCCK", "color separated") for space in spaces)
+    mixed = inks and "".join(spec.channelnames[:4]) != "CMYK"
     return Source(
         _channels(pixels, spec, type_),
         _colour(spec, type_, pixels.dtype.kind == "f", name),
         spec.get_int_attribute("Orientation", 1), frame, len(numbers), numbers[frame], told,
+        mixed,
     )  # fmt: skip
 
 

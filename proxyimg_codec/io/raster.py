@@ -92,6 +92,8 @@ def parse(data: bytes, name: str, *, frame: int | None = None, clip: bool = Fals
     if is_jpeg and colour == color.Colour() and exif.is_adobe_rgb(told.get("exif", b"")):
         colour = color.ADOBE_RGB
     pixels, blocks, notes = color.adopt(source.pixels, colour)
+    if source.mixed and not source.colour.inks:
+        notes.append("converted from CMYK without a profile")
     lost = metadata.left_out(data)
     if source.told and not told and not lost:
         lost = ["metadata in a form that is not read"]
@@ -152,9 +154,8 @@ def _source(data: bytes, name: str, frame: int | None) -> oiio.Source:
     if metadata.is_cut_jpeg(data):
         raise InputError(f"{name}: damaged or truncated (the end of the JPEG data is missing)")
     if data[:2] == b"\xff\xd8" and found.colour.icc[16:20] == b"CMYK":
-        return replace(
-            found, pixels=frames.inks(data, name), colour=replace(found.colour, inks=True)
-        )
+        colour = replace(found.colour, inks=True)
+        return replace(found, pixels=frames.inks(data, name), colour=colour)
     return replace(found, pixels=standard(found.pixels))
 
 
@@ -231,9 +232,9 @@ def _encode(kind: str, pixels: Pixels, blocks: dict[str, bytes]) -> tuple[bytes,
     cicp = blocks.get("cicp")
     holds = {k: v for k, v in blocks.items() if k not in color.COLOUR}
     said = {k: v for k, v in blocks.items() if k in color.COLOUR}
-    if cicp is not None and kind not in oiio.LINEAR:
+    if cicp is not None and kind not in oiio.LINEAR and "icc" not in said:
         made = color.profile_of(cicp)
-        said = {"cicp": cicp} if made is None else {"cicp": cicp, "icc": made}
+        said |= {} if made is None else {"icc": made}
     data, follows = oiio.encode(kind, pixels, said)
     data, lost = metadata.embed(data, holds)
     return data, lost if follows else [*lost, "icc"]

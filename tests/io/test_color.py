@@ -395,6 +395,14 @@ def test_types_that_can_say_what_colours_they_have(tmp_path, suffix, blocks):
     np.testing.assert_allclose(color.to_srgb(picture.pixels, picture.blocks), wanted, atol=0.02)
 
 
+@pytest.mark.parametrize("suffix", [".jpg", ".tif", ".webp"])
+def test_a_profile_beside_cicp_is_for_types_that_hold_only_those(tmp_path, suffix):
+    profile = color.profile_of(bytes([9, 14, 0, 1]))
+    for cicp in (PQ, DISPLAY_P3):
+        assert write(tmp_path / f"a{suffix}", colours(), {"cicp": cicp, "icc": profile}) == ()
+        assert read(tmp_path / f"a{suffix}").blocks == {"icc": profile}
+
+
 @pytest.mark.parametrize(
     ("suffix", "blocks"),
     [

@@ -347,7 +347,9 @@ def test_cmyk_becomes_rgb(tmp_path):
     inks = np.zeros((4, 4, 4), np.uint8)
     inks[..., 1:3] = 255  # magenta and yellow make red
     path = save(tmp_path / "a.tif", inks, tiff__ColorSpace="CMYK", channelnames=tuple("CMYK"))
-    np.testing.assert_array_equal(read(path).pixels, np.full((4, 4, 3), RED, np.uint8))
+    picture = read(path)
+    np.testing.assert_array_equal(picture.pixels, np.full((4, 4, 3), RED, np.uint8))
+    assert picture.notes == ("converted from CMYK without a profile",)
 
 
 def test_further_channels_are_left_out(tmp_path):
