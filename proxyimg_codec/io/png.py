@@ -26,6 +26,9 @@ _READ = (XMP, *(f"Raw profile type {name}" for name in ("exif", "xmp", "APP1", "
 _TEXT_MAX = 1 << 26
 """Most bytes of a compressed text or profile that are read."""
 
+_ROWS_MAX = 1 << 40
+"""Most bytes of pixels that are looked for."""
+
 _PIXELS = (b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND")
 """Chunks that decide about pixels."""
 
@@ -160,7 +163,14 @@ def checked(data: bytes, name: str) -> bytes:
         at = end + 4
     if problem:
         raise InputError(f"{name}: damaged or truncated ({problem})")
-    return _file(kept)
+    return _file([part for part in kept if _useful(*part, kept[0][1][9])])
+
+
+def _useful(kind: bytes, body: bytes, colours: int) -> bool:
+    """Whether a chunk has a place beside pixels of a colour type; others need not be there."""
+    if kind == b"tRNS":
+        return len(body) == {0: 2, 2: 6}.get(colours) or (colours == 3 and 0 < len(body) <= 256)
+    return kind != b"PLTE" or colours not in (0, 4)
 
 
 def _problem(kept: list[tuple[bytes, bytes]]) -> str:
@@ -176,6 +186,9 @@ def _problem(kept: list[tuple[bytes, bytes]]) -> str:
     before = last[: last.index(b"IDAT")] if b"IDAT" in last else last
     if colours == 3 and b"PLTE" not in before:
         return "the palette is missing"
+    palettes = [body for kind, body in kept if kind == b"PLTE"]
+    if len(palettes) > 1 or any(len(b) % 3 or not 3 <= len(b) <= 768 for b in palettes):
+        return "the palette is damaged"
     passes = _PASSES if interlace else ((0, 0, 1, 1),)
     bits = depth * _SAMPLES[colours]
     sizes = [(-((x - width) // dx), -((y - height) // dy)) for x, y, dx, dy in passes]
@@ -183,10 +196,12 @@ def _problem(kept: list[tuple[bytes, bytes]]) -> str:
     wanted = sum(h * span for h, span in spans)
     stream = zlib.decompressobj()
     try:
-        rows = stream.decompress(b"".join(b for k, b in kept if k == b"IDAT"), wanted + 1)
+        rows = stream.decompress(
+            b"".join(b for k, b in kept if k == b"IDAT"), min(wanted + 1, _ROWS_MAX)
+        )
     except zlib.error:
         return "the pixels are damaged"
-    if len(rows) != wanted or not stream.eof:
+    if len(rows) < wanted or (len(rows) == wanted and not stream.eof):
         return "the pixels are damaged"
     start = 0
     for h, span in spans:

@@ -11,7 +11,7 @@ import pytest
 
 from proxyimg_codec.errors import InputError, UnsupportedError, UsageError
 from proxyimg_codec.io.metadata import is_cut_jpeg, raw_blocks, upright
-from proxyimg_codec.io.png import encode_png
+from proxyimg_codec.io.png import _file, chunks, encode_png
 from proxyimg_codec.io.raster import parse, read, write
 from tests.support.pictures import icc
 
@@ -341,6 +341,66 @@ def test_kinds_of_png(tmp_path, data, expected):
     pixels = read(tmp_path / "a.png").pixels
     assert pixels.dtype == expected.dtype
     np.testing.assert_array_equal(pixels, expected)
+
+
+def parts_of(data: bytes) -> list[tuple[bytes, bytes]]:
+    return list(chunks(data))
+
+
+CHANGES = {
+    "no-end": lambda p: p[:-1],
+    "no-pixels": lambda p: [c for c in p if c[0] != b"IDAT"],
+    "no-palette": lambda p: [c for c in p if c[0] != b"PLTE"],
+    "two-palettes": lambda p: [*p[:2], p[1], *p[2:]],
+    "palette-odd": lambda p: [(k, b[:-1] if k == b"PLTE" else b) for k, b in p],
+    "head-short": lambda p: [(k, b[:-1] if k == b"IHDR" else b) for k, b in p],
+    "head-empty": lambda p: [(k, bytes(13) if k == b"IHDR" else b) for k, b in p],
+    "huge": lambda p: [(k, b"\x7f\xff\xff\xff" * 2 + b[8:] if k == b"IHDR" else b) for k, b in p],
+    "depth": lambda p: [(k, b[:8] + b"\x20" + b[9:] if k == b"IHDR" else b) for k, b in p],
+    "rows-few": lambda p: [(k, zlib.compress(bytes(3)) if k == b"IDAT" else b) for k, b in p],
+    "filter": lambda p: [(k, zlib.compress(b"\5\0\0\0\0\0") if k == b"IDAT" else b) for k, b in p],
+    "stream": lambda p: [(k, b[:-5] if k == b"IDAT" else b) for k, b in p],
+    "no-stream": lambda p: [(k, b"rubbish" if k == b"IDAT" else b) for k, b in p],
+}
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_damaged_png_files_are_refused_before_libpng_prints(name, capfd):
+    whole = parts_of(png(3, 8, b"\0\0\1\0\2\0", PLTE=PALETTE))
+    with pytest.raises(InputError, match=r"^a: damaged or truncated \([^\n]+\)$"):
+        parse(_file(CHANGES[name](whole)), "a")
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("kind", [b"PLTE", b"tRNS", b"iCCP", b"gAMA", b"zTXt", b"teST", b"sBIT"])
+def test_chunks_that_are_wrong_or_out_of_place_do_not_matter(kind, capfd):
+    first, *rest = parts_of(encode_png(noise(3)))
+    found = parse(_file([first, (kind, b"\1\2\3" * 9), *rest]), "a")
+    np.testing.assert_array_equal(found.pixels, noise(3))
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("mode", ["L", "P", "RGB", "RGBA", "1"])
+def test_interlaced_png(tmp_path, mode):
+    """The seven passes of the rows that come first, of sizes that some passes miss."""
+    image = pytest.importorskip("PIL.Image")
+    rng = np.random.default_rng(1)
+    for width, height in ((1, 1), (3, 2), (5, 9), (13, 8)):
+        shown = image.fromarray(rng.integers(0, 256, (height, width, 3), np.uint8)).convert(mode)
+        pixels = np.asarray(shown.convert("RGBA" if mode == "RGBA" else "RGB"))
+        depth, kind = {"L": (8, 0), "P": (8, 3), "RGB": (8, 2), "RGBA": (8, 6), "1": (1, 0)}[mode]
+        stored = np.asarray(shown).reshape(height, width, -1)
+        rows = b""
+        for x, y, dx, dy in ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4),
+                             (1, 0, 2, 2), (0, 1, 1, 2)):  # fmt: skip
+            for row in stored[y::dy, x::dx]:
+                if len(row):
+                    rows += b"\0" + (np.packbits(row) if mode == "1" else row).tobytes()
+        head = struct.pack(">IIBBBBB", width, height, depth, kind, 0, 0, 1)
+        palette = [(b"PLTE", bytes(shown.getpalette()))] if mode == "P" else []
+        parts = [(b"IHDR", head), *palette, (b"IDAT", zlib.compress(rows)), (b"IEND", b"")]
+        found = parse(_file(parts), "a").pixels
+        np.testing.assert_array_equal(found, pixels[..., : found.shape[2]])
 
 
 def test_cmyk_becomes_rgb(tmp_path):
