@@ -85,11 +85,26 @@ def orientation(exif: bytes) -> int | None:
 
 def is_adobe_rgb(exif: bytes) -> bool:
     """Whether a block has the mark of Adobe RGB, index R03 (Exif 2.32, Annex A and DCF 2.0)."""
+    at = _mark(exif)
+    return at is not None and exif[at : at + 3] == b"R03"
+
+
+def as_srgb(exif: bytes) -> bytes:
+    """Sets the mark of Adobe RGB in a block, if there is one, to that of sRGB, R98."""
+    at = _mark(exif)
+    return exif[:at] + b"R98" + exif[at + 3 :] if at is not None and is_adobe_rgb(exif) else exif
+
+
+def _mark(exif: bytes) -> int | None:
+    """Place of the index of interoperability in a block; None if there is none."""
     order = _order(exif)
-    found: Value | Directory = _directory(exif, order, _first(exif, order)) if order else {}
-    for tag in (_EXIF, _INTEROPERABILITY, 1):
-        found = found.get(tag, {}) if isinstance(found, dict) else {}
-    return isinstance(found, tuple) and found[2][:3] == b"R03"
+    if order is None:
+        return None
+    start = _first(exif, order)
+    for tag in (_EXIF, _INTEROPERABILITY):
+        places = [at for found, at in _entries(exif, order, start) if found == tag]
+        start = struct.unpack_from(order + "I", exif, places[0] + 8)[0] if places else 0
+    return next((at + 8 for found, at in _entries(exif, order, start) if found == 1), None)
 
 
 def upright(exif: bytes) -> bytes:

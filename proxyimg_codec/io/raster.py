@@ -212,6 +212,8 @@ def write(
     """
     kind = suffix or Path(path).suffix.lower()
     blocks = metadata.upright(blocks or {})  # the pixels are, whatever these say [MET-6]
+    if "exif" in blocks and color.is_srgb(blocks):
+        blocks["exif"] = exif.as_srgb(blocks["exif"])
     lost = [*blocks]
     if kind == ".png":
         data, lost = png.encode_png(pixels, blocks), []

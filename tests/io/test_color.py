@@ -310,8 +310,17 @@ def test_the_camera_mark_of_adobe_rgb(tmp_path):
     picture = read(tmp_path / "a.jpg")
     adobe = (0.64, 0.33, 0.21, 0.71, 0.15, 0.06, 0.3127, 0.3290)
     light = (picture.pixels[0, 0] / 255) ** 2.199 @ between(adobe, SRGB).T
-    shown = color.to_srgb(picture.pixels, picture.blocks)[0, 0]
-    np.testing.assert_allclose(shown, to_numbers(light), atol=4e-3)
+    shown = color.to_srgb(picture.pixels, picture.blocks)
+    np.testing.assert_allclose(shown[0, 0], to_numbers(light), atol=4e-3)
+    # A picture that was converted must not bear the mark on.
+    pixels = np.rint(shown * 255).astype(np.uint8)
+    for suffix in (".jpg", ".png", ".tif", ".webp"):
+        write(tmp_path / f"b{suffix}", pixels, {"exif": picture.blocks["exif"]})
+        again = read(tmp_path / f"b{suffix}")
+        assert set(again.blocks) == {"exif"}
+        assert b"R03" not in again.blocks["exif"]
+    write(tmp_path / "c.jpg", picture.pixels, picture.blocks)
+    assert b"R03" in read(tmp_path / "c.jpg").blocks["exif"]
 
 
 # Conversion to sRGB
