@@ -85,6 +85,25 @@ def test_an_exr_file_that_says_srgb_is_left_as_it_is(tmp_path):
     assert picture.notes == ()
 
 
+@pytest.mark.parametrize(
+    ("space", "blocks"),
+    [
+        ("srgb_p3d65_scene", {"cicp": DISPLAY_P3}),
+        ("pq_rec2020_display", {"cicp": PQ}),
+        ("g22_rec709_scene", {"cicp": bytes([1, 4, 0, 1])}),
+        ("g22_adobergb_scene", "icc"),
+        ("lin_rec2020_scene", {}),
+        ("lin_ap1_scene", {}),
+    ],
+)
+def test_colour_spaces_that_openexr_names(tmp_path, space, blocks):
+    path = save(tmp_path / "a.exr", np.full((3, 4, 3), 0.25), oiio__ColorSpace=space)
+    picture = read(path)
+    assert picture.blocks == blocks or set(picture.blocks) == {blocks}
+    white = to_numbers(0.25) if space.startswith("lin") else 0.25  # grey is grey in all of them
+    np.testing.assert_allclose(picture.pixels, white, atol=1e-4)
+
+
 def test_alpha_is_not_converted_and_colour_is_straight(tmp_path):
     alpha = np.array([[[0.25], [0.5], [1.0], [0.0]]])
     light = np.concatenate([np.full((1, 4, 3), 0.2) * alpha, alpha], axis=2)
