@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Mapping
 
-ORIENTATION, XMP = 0x0112, 0x02BC
+ORIENTATION, XMP, IPTC = 0x0112, 0x02BC, 0x83BB
 _EXIF, _GPS, _INTEROPERABILITY = 0x8769, 0x8825, 0xA005
 _POINTERS = (_EXIF, _GPS, _INTEROPERABILITY)
 """Tags whose value is the place of another directory."""
@@ -20,7 +20,7 @@ _NUMBER = {1: "B", 3: "H", 4: "I"}
 
 _STRUCTURE = {
     *range(254, 270), *range(273, 274), *range(277, 282), *range(284, 294), 297, 301,
-    *range(317, 348), *range(512, 533), XMP, 33723, 34377, 34675, 37724,
+    *range(317, 348), *range(512, 533), XMP, IPTC, 34377, 34675, 37724,
 }  # fmt: skip
 """Tags that describe the pixels of a TIFF file, or hold what is no EXIF."""
 
@@ -68,6 +68,12 @@ def _next(data: bytes, order: str, start: int) -> int:
 
 def _first(data: bytes, order: str) -> int:
     return int(struct.unpack_from(order + "I", data, 4)[0])
+
+
+def tags(data: bytes) -> set[int]:
+    """Tags of the first directory of a TIFF structure; none if `data` is no such structure."""
+    order = _order(data)
+    return {tag for tag, _ in _entries(data, order, _first(data, order))} if order else set()
 
 
 def orientation(exif: bytes) -> int | None:

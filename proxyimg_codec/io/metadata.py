@@ -35,8 +35,8 @@ def raw_blocks(data: bytes, number: int = 0) -> dict[str, bytes]:
 
 
 def left_out(data: bytes) -> list[str]:
-    """Names what a JPEG or PNG file tells that is neither EXIF, XMP nor colour."""
-    found = []
+    """Names what a JPEG, PNG or TIFF file tells that is neither EXIF, XMP nor colour."""
+    found = ["IPTC"] if exif.IPTC in exif.tags(data) else []
     for marker, body in jpeg_segments(data):
         if marker == 0xED and b"8BIM\x04\x04" in body:
             found.append("IPTC")

@@ -276,6 +276,8 @@ def test_what_is_neither_exif_nor_xmp_is_named():
     assert metadata.left_out(png_of(PIXELS, (b"tEXt", b"Title\0Cat"))) == ["texts"]
     assert metadata.left_out(png_of(PIXELS, (b"tEXt", b"Software\0Cat"))) == []
     assert metadata.left_out(JPEG) == []
+    assert metadata.left_out(tiff_of(PIXELS, t33723=7)) == ["IPTC"]
+    assert metadata.left_out(tiff_of(PIXELS)) == []
 
 
 def test_boxes_that_are_open_ended_or_long(tmp_path):
