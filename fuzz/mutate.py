@@ -27,7 +27,7 @@ _HISTORY = b"uNDO"
 _NUMBERS = (0, 1, 2, 3, 4, 8, 16, 63, 64, 127, 128, 255, 256, 65535, 65536, 1 << 24, (1 << 31) - 1,
             1 << 31, 1 << 33, 1 << 48, (1 << 63) - 1, (1 << 64) - 1)  # fmt: skip
 _TYPES = (b"HEAD", b"LAYR", b"MESH", b"POSE", b"NETW", b"PLAN", b"TEXR", b"iCCp", b"eXIf", b"xMPd",
-          b"iNFO", b"tREE", b"mOTN", b"uNDO", b"TAIL", b"abCd", b"ABCD")  # fmt: skip
+          b"cICp", b"iNFO", b"tREE", b"mOTN", b"uNDO", b"TAIL", b"abCd", b"ABCD")  # fmt: skip
 
 
 def split(data: bytes) -> Chunks:

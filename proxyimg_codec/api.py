@@ -360,10 +360,12 @@ def encode(
 
     Args:
         pixels: [H, W] or [H, W, C] with C = 1 for grey, 2 for grey and alpha, 3 for RGB, 4 for RGB
-            and alpha; alpha is straight; uint8, uint16, or floating point in 0..1.
+            and alpha; alpha is straight; integers without a sign, of which the largest of their
+            type is white, bool, or floating point in 0..1.
         settings: Settings of the encoder; by default ``Settings()``.
         masks: Layers given by the user, back to front; by default the encoder finds layers itself.
-        blocks: Metadata blocks to carry: ``icc``, ``exif``, ``xmp``.
+        blocks: Metadata blocks to carry: ``icc`` and ``cicp``, which say what colours these are,
+            ``exif`` and ``xmp``; `io.raster.read` gives those of a file.
         progress: Called with the name of a stage, and its numbers of units done and in all.
         options: Fields of `Settings` that replace those of `settings`, such as ``quality=70``.
 

@@ -86,7 +86,7 @@ class PictureHandle(Handle):
 
     @property
     def blocks(self) -> Mapping[str, bytes]:
-        """Metadata blocks ``icc``, ``exif``, ``xmp``."""
+        """Metadata blocks ``icc``, ``cicp``, ``exif``, ``xmp``."""
         return self._picture.blocks
 
     @property

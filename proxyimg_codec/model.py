@@ -128,7 +128,7 @@ class Picture:
         depth: Bits per sample of the original picture, 8 or 16.
         layers: Layers back to front.
         networks: Decoder networks.
-        blocks: Metadata blocks ``icc``, ``exif``, ``xmp``.
+        blocks: Metadata blocks ``icc``, ``cicp``, ``exif``, ``xmp``.
         info: Fields of the iNFO chunk (encoder, settings and areas), or None.
         extra: Unknown ancillary chunks, which are carried along.
         groups: Name of the parent group or layer of each group, or None, by the group's name.

@@ -39,6 +39,7 @@ CHUNKS = {
     meta.BLOCKS["icc"]: "ICC profile",
     meta.BLOCKS["exif"]: "EXIF",
     meta.BLOCKS["xmp"]: "XMP",
+    meta.CICP_TYPE: "primaries and transfer",
     meta.INFO_TYPE: "how the file was made",
     tree.TYPE: "groups of layers",
     motn.TYPE: "motion",

@@ -53,6 +53,7 @@ FIELDS = {
     "TEXR pyramid": texr.PYRAMID_FIELDS,
     "PLAN": plan.FIELDS,
     "BLOCK": meta.FIELDS,
+    "cICp": meta.CICP_FIELDS,
     "iNFO": meta.INFO_FIELDS,
     "tREE": tree.FIELDS,
     "mOTN": motn.FIELDS,

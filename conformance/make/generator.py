@@ -24,7 +24,7 @@ from proxyimg_codec import errors, from_bytes
 from proxyimg_codec.codec import levels
 from proxyimg_codec.codec.write import to_bytes
 from proxyimg_codec.container import chunks, layr, motn, pose
-from proxyimg_codec.io.raster import encode_png
+from proxyimg_codec.io.png import encode_png
 from proxyimg_codec.native import kernel
 
 from .. import judge, pixels, symbols

@@ -102,7 +102,7 @@ def _expected(target: Path, data: bytes, dice: random.Random | None) -> dict[str
         MemoryError: The canvas is too large to try all mutants on the file.
     """
     from proxyimg_codec import from_bytes
-    from proxyimg_codec.io.raster import encode_png
+    from proxyimg_codec.io.png import encode_png
 
     from ..symbols import digest
 

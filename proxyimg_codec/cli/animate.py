@@ -210,18 +210,22 @@ def write_clip(image: Image, args: argparse.Namespace) -> str:
     """Renders and writes the clip; returns a sentence about it for the user."""
     from ..animate.sequence import frames, times
     from ..export import clip
+    from ..io.color import is_srgb, to_srgb
+    from ..io.samples import rounded
 
     assert image.timeline is not None, "it moves, or was given a motion"
     playing = not (args.preset or args.motion)
     at = times(image, duration=args.duration if playing else None, fps=args.fps)
     width, height = size_of(args.size, image)
     bar = Bar(len(at), "rendering", args.quiet)
+    srgb = is_srgb(image.blocks)
 
     def shown() -> Any:
         for frame in frames(
             image, at, jobs=args.jobs, width=width, height=height, engine=args.engine
         ):
-            yield frame
+            # No player looks for a profile in a clip.
+            yield frame if srgb else rounded(to_srgb(frame, image.blocks), "uint8")
             bar.advance(1)
 
     try:

@@ -21,6 +21,7 @@ from .common import (
     key,
     limits_of,
     parser,
+    printable,
     run,
 )  # fmt: skip
 
@@ -51,7 +52,9 @@ def arguments() -> argparse.ArgumentParser:
     add("--layer", action="append", metavar="NAME|INDEX", help="draw only this layer; repeatable")
     add("--no-background", action="store_true", help="leave out the back layer")
     add("--bit-depth", type=int, choices=[8, 16, 32], help="bits a sample, 32 = floating point; "
-        "8 by default")  # fmt: skip
+        "8 by default, for types of linear light 16")  # fmt: skip
+    add("--srgb", action="store_true", help="convert to sRGB; by default the colours are those of "
+        "the file, and OUT says what they are if it can")  # fmt: skip
     add("--engine", choices=["auto", "numpy", "native", "ort"], default="auto",
         help="who runs the networks; auto is the fastest that is built in")  # fmt: skip
     add("--tolerant", action="store_true", help="of a file that is cut off or damaged, make the "
@@ -130,7 +133,8 @@ def refuse_render_flags(args: argparse.Namespace) -> None:
         UsageError: A rendering flag is given.
     """
     chosen = ("time", "no_background") if args.graph == "full" else ()
-    flags = ("scale", "fit", "width", "height", "region", "time", "no_background", "bit_depth")
+    flags = ("scale", "fit", "width", "height", "region", "time", "no_background", "bit_depth",
+             "srgb")  # fmt: skip
     for name in flags:
         value = getattr(args, name)
         if value is not None and value is not False and name not in chosen:
@@ -154,6 +158,8 @@ def refuse_for_layers(args: argparse.Namespace, kind: str) -> None:
     for name in ("scale", "fit", "width", "height", "region"):
         if getattr(args, name) is not None:
             raise UsageError(f"--{name}: a {kind} file has the size of the canvas")
+    if args.srgb:
+        raise UsageError(f"--srgb: a {kind} file has the colours of the input")
     if args.time is not None and kind == ".svg":
         raise UsageError("--time: a .svg file has the outlines of the still")
     if args.bit_depth is not None and (kind == ".svg" or args.bit_depth == 32):
@@ -212,7 +218,10 @@ def render(image: Any, output: str, args: argparse.Namespace) -> None:
     """Renders and writes the picture."""
     import numpy as np
 
+    from ..io.color import COLOUR, is_srgb, to_srgb
+    from ..io.oiio import LINEAR
     from ..io.raster import write
+    from ..io.samples import rounded
     from ..render.view import make_view
 
     region = parse_region(args.region)
@@ -224,7 +233,9 @@ def render(image: Any, output: str, args: argparse.Namespace) -> None:
         scale = min(1.0, args.fit / max(1, *sides))
     view = make_view((image.width, image.height), args.width, args.height, scale, region)
     bar = Bar(view.width * view.height, "rendering", args.quiet)
-    dtype = {8: np.uint8, 16: np.uint16, 32: np.float32}[args.bit_depth or 8]
+    depth = args.bit_depth or (16 if Path(output).suffix.lower() in LINEAR else 8)
+    dtype = {8: np.uint8, 16: np.uint16, 32: np.float32}[depth]
+    converted = args.srgb and not is_srgb(image.blocks)
     try:
         pixels = image.render(
             width=view.width,
@@ -232,14 +243,20 @@ def render(image: Any, output: str, args: argparse.Namespace) -> None:
             region=region,
             layers=[key(n) for n in args.layer] if args.layer else None,
             background=not args.no_background,
-            dtype=dtype,
+            dtype=np.float32 if converted else dtype,
             engine=args.engine,
             limits=limits_of(args),
             progress=bar.advance,
         )
     finally:
         bar.close()
-    write(output, pixels, image.blocks, ".png" if output == "-" else None)
+    blocks = image.blocks
+    if converted:
+        pixels = rounded(to_srgb(pixels, blocks), dtype)
+        blocks = {k: v for k, v in blocks.items() if k not in COLOUR}
+    notes = write(output, pixels, blocks, ".png" if output == "-" else None)
+    for note in () if args.quiet else notes:
+        print(f"pxi-decode: warning: {printable(output)}: {note}", file=sys.stderr)
 
 
 def layered(image: Any, output: str, kind: str, args: argparse.Namespace) -> None:

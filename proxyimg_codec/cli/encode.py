@@ -11,7 +11,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
-from .common import Bar, check_target, default_target, parser, run
+from .common import Bar, check_target, default_target, parser, printable, run
 
 PRESET_NAMES = ("fast", "default", "best", "paper")
 
@@ -28,7 +28,7 @@ def arguments() -> argparse.ArgumentParser:
     _add_aims(p)
     _add_decomposition(p)
     _add_details(p)
-    p.add_argument("--strip", action="store_true", help="leave out ICC, EXIF and XMP")
+    _add_reading(p)
     p.add_argument("-f", "--force", action="store_true", help="replace OUT if it exists")
     p.add_argument("--quiet", action="store_true", help="print nothing but errors")
     p.add_argument(
@@ -85,6 +85,17 @@ def _add_details(p: argparse.ArgumentParser) -> None:
     add("-j", "--jobs", type=int, metavar="N", help="threads, at most 4 of use; all cores by "
         "default")  # fmt: skip
     add("--device", choices=["cpu", "cuda"], default="cpu", help="where to fit; default cpu")
+
+
+def _add_reading(p: argparse.ArgumentParser) -> None:
+    """Adds the flags that say what is taken from the input."""
+    add = p.add_argument
+    add("--frame", type=int, metavar="N", help="which picture of an input that holds several, "
+        "counted from 0; by default the first, or the largest of an icon")  # fmt: skip
+    add("--tone", choices=["clip"], help="clip: what is darker or brighter than 0..1 of sRGB is "
+        "cut off there; by default it is refused")  # fmt: skip
+    add("--strip", action="store_true", help="leave out EXIF and XMP, and convert to sRGB what has "
+        "another colour")  # fmt: skip
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -159,7 +170,8 @@ def encoded(source: bytes, args: argparse.Namespace, settings: Any, bar: Bar) ->
     from ..encoder.import_layers import composite, encode_layers
     from ..encoder.openraster import is_openraster, read_openraster
     from ..encoder.shapes.masks import load_masks
-    from ..io.raster import parse
+    from ..io.color import is_srgb
+    from ..io.raster import parse, stripped
 
     seen = 0
 
@@ -174,16 +186,21 @@ def encoded(source: bytes, args: argparse.Namespace, settings: Any, bar: Bar) ->
         refuse_for_layers(args)
         layered = read_openraster(source, name)
         if args.strip:
+            if not is_srgb(layered.blocks) and not args.quiet:
+                print(f"pxi-encode: warning: {printable(name)}: without its profile its colours "
+                      "look wrong", file=sys.stderr)  # fmt: skip
             layered = replace(layered, blocks={})
         image, kept = encode_layers(layered, settings, progress)
         for layer in () if args.quiet else kept.left_out:
             print(f"{name}: layer {layer!r} has nothing to be seen; left out", file=sys.stderr)
         return image, composite(layered)
-    picture = parse(source, name)
+    picture = parse(source, name, frame=args.frame, clip=args.tone == "clip")
+    picture = stripped(picture) if args.strip else picture
     height, width = picture.pixels.shape[:2]
     masks = None if args.masks is None else load_masks(args.masks, width, height)
-    blocks = {} if args.strip else picture.blocks
-    image = encode(picture.pixels, settings, masks=masks, blocks=blocks, progress=progress)
+    image = encode(picture.pixels, settings, masks=masks, blocks=picture.blocks, progress=progress)
+    for note in () if args.quiet else picture.notes:
+        print(f"pxi-encode: warning: {printable(name)}: {note}", file=sys.stderr)
     return image, picture.pixels
 
 
@@ -202,7 +219,7 @@ def refuse_for_layers(args: argparse.Namespace) -> None:
     """
     from ..errors import UsageError
 
-    for name in ("masks", "layers", "max_layers", "segmenter"):
+    for name in ("masks", "layers", "max_layers", "segmenter", "frame", "tone"):
         if getattr(args, name) is not None:
             flag = name.replace("_", "-")
             raise UsageError(f"--{flag}: the input has layers of its own, which are kept")

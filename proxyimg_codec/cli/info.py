@@ -72,6 +72,7 @@ def describe(c: Container, size: int) -> dict[str, Any]:
         "groups": c.tree["groups"] if c.tree else [],
         "edits": [step.operation for step in c.history],
         "metadata": {name: len(block) for name, block in c.blocks.items()},
+        "cicp": dict(c.cicp) if c.cicp else None,
         "chunk_bytes": dict(c.sizes),
         "encoder": (c.info or {}).get("encoder"),
         "settings": settings(c),
@@ -198,6 +199,9 @@ def text(f: dict[str, Any]) -> str:
     if f["groups"]:
         lines.append(f"groups: {', '.join(map(repr, f['groups']))}")
     lines += [f"edit {i}: {printable(v)}" for i, v in enumerate(f["edits"], 1)]
+    if f["cicp"]:
+        two = f["cicp"]
+        lines.append(f"colour: primaries {two['primaries']}, transfer {two['transfer']} of H.273")
     lines += [f"{name}: {size} bytes" for name, size in f["metadata"].items()]
     if f["encoder"]:
         lines.append(f"made by {f['encoder']!r}, {json.dumps(f['settings'])}")

@@ -50,10 +50,17 @@ def pack(picture: Picture) -> Container:
         _tree(picture),
         _motion(picture),
         picture.history,
-        picture.blocks,
+        {k: v for k, v in picture.blocks.items() if k != "cicp"},
+        _cicp(picture),
         picture.info,
         picture.extra,
     )
+
+
+def _cicp(picture: Picture) -> Mapping[str, Any] | None:
+    """Fields of cICp; None for a picture without the block."""
+    block = picture.blocks.get("cicp")
+    return None if block is None else {"primaries": block[0], "transfer": block[1]}
 
 
 def _textures(picture: Picture) -> tuple[Mapping[str, Any], ...]:

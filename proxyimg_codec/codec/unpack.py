@@ -61,10 +61,17 @@ def unpack(c: Container, budget: Budget, damage: tuple[str, ...] = ()) -> Pictur
     width, height = c.head["size"]
     return Picture(
         width, height, c.head["channels"], bool(c.head["opaque"]), c.head["depth"],
-        Layers(layers), networks, c.blocks, c.info,
+        Layers(layers), networks, _blocks(c), c.info,
         tuple(chunk for chunk in c.extra if chunk.type != PADDING),
         groups, timeline, c.history, damage,
     )  # fmt: skip
+
+
+def _blocks(c: Container) -> Mapping[str, bytes]:
+    """Metadata blocks; ``cicp`` in the form that PNG has."""
+    if c.cicp is None:
+        return c.blocks
+    return {**c.blocks, "cicp": bytes([c.cicp["primaries"], c.cicp["transfer"], 0, 1])}
 
 
 def _parents(c: Container) -> tuple[list[str | None], dict[str, str | None]]:

@@ -29,6 +29,7 @@ class Container:
         motion: Fields of mOTN, or None.
         history: Steps of uNDO that led to this state, oldest first.
         blocks: Metadata blocks by name: ``icc``, ``exif``, ``xmp``.
+        cicp: Fields of cICp, or None.
         info: Fields of iNFO, or None.
         extra: Unknown ancillary chunks.
         sizes: Number of bytes of all chunks of a type together, framing included, by type.
@@ -45,6 +46,7 @@ class Container:
     motion: Values | None = None
     history: tuple[undo.Step, ...] = ()
     blocks: Mapping[str, bytes] = field(default_factory=dict)
+    cicp: Values | None = None
     info: Values | None = None
     extra: tuple[Chunk, ...] = ()
     sizes: Mapping[str, int] = field(default_factory=dict)

@@ -13,11 +13,12 @@ from .content import Container, Values
 from .fields import Field, pack, unpack
 
 _STRUCTURE = (layr.TYPE, mesh.TYPE, pose.TYPE, netw.TYPE, plan.TYPE, texr.TYPE)
-_SINGLE = (meta.INFO_TYPE, tree.TYPE, motn.TYPE, undo.TYPE)
+_SINGLE = (meta.CICP_TYPE, meta.INFO_TYPE, tree.TYPE, motn.TYPE, undo.TYPE)
 _BLOCK_NAMES = {type_: name for name, type_ in meta.BLOCKS.items()}
 _FIELDS = {
     **{m.TYPE: m.FIELDS for m in (head, layr, mesh, pose, netw, plan, tree, motn, undo)},
     **dict.fromkeys(_BLOCK_NAMES, meta.FIELDS),
+    meta.CICP_TYPE: meta.CICP_FIELDS,
     meta.INFO_TYPE: meta.INFO_FIELDS,
 }
 
@@ -146,6 +147,7 @@ class _Parts:
             motion=single.get(motn.TYPE),
             history=self._history,
             blocks=self._blocks,
+            cicp=single.get(meta.CICP_TYPE),
             info=single.get(meta.INFO_TYPE),
             extra=tuple(self._extra),
             sizes=sizes,
@@ -202,7 +204,8 @@ def serialize(c: Container) -> bytes:
 def present(c: Container) -> list[Chunk]:
     """Packs all chunks but uNDO and TAIL.
 
-    Their order is HEAD, LAYR, MESH, POSE, NETW, PLAN, TEXR, metadata, iNFO, tREE, mOTN, others.
+    Their order is HEAD, LAYR, MESH, POSE, NETW, PLAN, TEXR, metadata, cICp, iNFO, tREE, mOTN,
+    others.
     """
     chunks = [Chunk(head.TYPE, pack(head.FIELDS, c.head))]
     for module, values in (
@@ -214,6 +217,8 @@ def present(c: Container) -> list[Chunk]:
         chunks.append(Chunk(texr.TYPE, pack(texr.CODERS[v["coder"]], v)))
     for name, block in c.blocks.items():
         chunks.append(Chunk(meta.BLOCKS[name], meta.compress(block)))
+    if c.cicp is not None:
+        chunks.append(Chunk(meta.CICP_TYPE, pack(meta.CICP_FIELDS, c.cicp)))
     if c.info is not None:
         chunks.append(Chunk(meta.INFO_TYPE, pack(meta.INFO_FIELDS, c.info)))
     if c.tree is not None:

@@ -1,4 +1,4 @@
-"""iCCp, eXIf, xMPd: compressed metadata blocks; iNFO: the program that made the file."""
+"""iCCp, eXIf, xMPd: compressed metadata blocks; cICp: colour; iNFO: the program that wrote."""
 
 import zstandard
 
@@ -20,6 +20,13 @@ MAGIC = b"\x28\xb5\x2f\xfd"
 
 WINDOW_MAX = 1 << 27
 """Largest window of a zstd frame, in bytes, that is accepted."""
+
+CICP_TYPE = "cICp"
+
+CICP_FIELDS = (
+    Field("primaries", "int", "Primaries: a number of ITU-T H.273, table 2.", 1, 255),
+    Field("transfer", "int", "Transfer characteristics: a number of its table 3.", 1, 255),
+)
 
 INFO_TYPE = "iNFO"
 

@@ -231,9 +231,9 @@ def _loaded(source: str, name: str | int | None) -> tuple[Picture, Layer]:
         return found, found.layers[-1 if name is None else name]
     if name is not None:
         raise UsageError(f"texture: {source} is not a .pxi file, which from_layer needs")
-    from ..io.raster import read
+    from ..io.raster import read, stripped
 
-    pixels = read(source).pixels
+    pixels = stripped(read(source)).pixels
     try:
         from ..encoder.encode import encode
     except ModuleNotFoundError as error:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from .._version import __version__
 from ..container import meta
 from ..errors import UsageError
+from ..io.color import cicp_problem
 from ..io.samples import to_float
 from ..limits import DEFAULT_LIMITS
 from ..model import Layer, Layers, Picture
@@ -58,10 +59,12 @@ def encode(
 
     Args:
         pixels: [H, W] or [H, W, C] with C = 1 for grey, 2 for grey and alpha, 3 for RGB, 4 for RGB
-            and alpha; alpha is straight; uint8, uint16, or floating point in 0..1.
+            and alpha; alpha is straight; integers without a sign, of which the largest of their
+            type is white, bool, or floating point in 0..1.
         settings: Settings of the encoder; by default ``Settings()``.
         masks: Layers given by the user, back to front; by default the encoder finds layers itself.
-        blocks: Metadata blocks to carry: ``icc``, ``exif``, ``xmp``.
+        blocks: Metadata blocks to carry: ``icc`` and ``cicp``, which say what colours these are,
+            ``exif`` and ``xmp``; `io.raster.read` gives those of a file.
         progress: Called with the name of a stage, and its numbers of units done and in all.
         options: Fields of `Settings` that replace those of `settings`, such as ``quality=70``.
 
@@ -181,12 +184,14 @@ def fit_image(
 
 
 def check_blocks(blocks: Mapping[str, bytes]) -> None:
-    """Raises `UsageError` if a metadata block is empty or of an unknown kind."""
+    """Raises `UsageError` if a metadata block is empty, of an unknown kind, or no colour."""
     for name, block in blocks.items():
-        if name not in meta.BLOCKS or not block:
-            raise UsageError(
-                f"metadata block {name!r} is empty or not one of {', '.join(meta.BLOCKS)}"
-            )
+        if name not in (*meta.BLOCKS, "cicp") or not block:
+            kinds = ", ".join((*meta.BLOCKS, "cicp"))
+            raise UsageError(f"metadata block {name!r} is empty or not one of {kinds}")
+    problem = cicp_problem(blocks["cicp"]) if "cicp" in blocks else None
+    if problem is not None:
+        raise UsageError(f"metadata block 'cicp': {problem}")
 
 
 def _fit(

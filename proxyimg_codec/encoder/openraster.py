@@ -20,7 +20,9 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, LimitError, UnsupportedError
 from ..io import xml
+from ..io.color import COLOUR
 from ..io.raster import parse as parse_picture
+from ..io.raster import stripped
 from ..limits import DEFAULT_LIMITS, Limits
 from .shapes.masks import unique_names
 
@@ -60,7 +62,7 @@ class LayeredPicture:
         width: Width of the canvas in pixels.
         height: Height of the canvas in pixels.
         layers: Layers that are not empty, back to front.
-        blocks: Metadata blocks; `read_openraster` gives the ICC profile, if there is one.
+        blocks: Metadata blocks; `read_openraster` gives ``icc`` and ``cicp``, if there are such.
         left_out: Names of the layers without visible pixels.
     """
 
@@ -112,7 +114,7 @@ def read_openraster(data: bytes, name: str, limits: Limits = DEFAULT_LIMITS) -> 
     )
     layers: list[SourceLayer] = []
     left_out: list[str] = []
-    blocks: dict[str, bytes] = {}
+    blocks: dict[str, bytes] | None = None
     pixels = 0
     for unique, (layer, source) in zip(names, found, strict=True):
         where = f"{name}: layer {unique!r}"
@@ -120,7 +122,14 @@ def read_openraster(data: bytes, name: str, limits: Limits = DEFAULT_LIMITS) -> 
         pixels += _png_pixels(png, where, limits)
         _check(limits, "output_pixels", pixels, f"{where}, with those behind it")
         picture = parse_picture(png, f"{where}: {source}")
-        blocks = blocks or {k: v for k, v in picture.blocks.items() if k == "icc"}
+        colours = {k: v for k, v in picture.blocks.items() if k in COLOUR}
+        blocks = colours if blocks is None else blocks
+        if colours != blocks and blocks:
+            raise UnsupportedError(
+                f"{where}: its colour profile is not that of the layers behind it; give all layers "
+                "the same"
+            )
+        picture = picture if colours == blocks else stripped(picture)
         placed = _clipped(replace(layer, name=unique, pixels=picture.pixels), width, height)
         if placed is None:
             left_out.append(unique)
@@ -128,7 +137,7 @@ def read_openraster(data: bytes, name: str, limits: Limits = DEFAULT_LIMITS) -> 
             layers.append(placed)
     if not layers:
         raise InputError(f"{name}: no layer has a pixel on the canvas of {width}x{height}")
-    return LayeredPicture(width, height, tuple(layers), blocks, tuple(left_out))
+    return LayeredPicture(width, height, tuple(layers), blocks or {}, tuple(left_out))
 
 
 def _check(limits: Limits, name: str, value: int, where: str) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..io.raster import encode_png
+from ..io.png import encode_png
 from .clip_target import Target
 
 Frame = NDArray[np.uint8]

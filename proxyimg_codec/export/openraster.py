@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..io import xml
-from ..io.raster import encode_png
+from ..io.color import COLOUR
+from ..io.png import encode_png
 from ..limits import DEFAULT_LIMITS, Limits
 from ..model import Layer, Picture, Pictured
 from ..render.cache import Cache
@@ -107,8 +108,8 @@ def _flat(picture: Picture, shown: list[str], draw: Draw, dtype: Any) -> dict[st
 
 
 def _profile(picture: Picture) -> dict[str, bytes]:
-    """Metadata for PNG files: the ICC profile, if there is one."""
-    return {k: v for k, v in picture.blocks.items() if k == "icc"}
+    """Metadata for PNG files: what says the colour, if anything does."""
+    return {k: v for k, v in picture.blocks.items() if k in COLOUR}
 
 
 def _attributes(layer: Layer, source: str, x: int, y: int) -> dict[str, str]:

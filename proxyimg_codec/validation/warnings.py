@@ -14,6 +14,7 @@ from ..container.content import Container
 from ..errors import PxiError
 from ..geometry.boundary import Boundary
 from ..io import xml
+from ..io.color import cicp_problem
 from ..model import Layer, Picture
 from ..render.neighbours import present_outline
 
@@ -32,8 +33,9 @@ CODES = {
     "VAL-10": "a layer that should move but does not",
     "VAL-11": "a history that was not checked as a whole, because it is too long",
     "VAL-12": "a version of the format before the present one",
+    "VAL-13": "a colour whose primaries or transfer are unspecified or unknown",
 }
-"""Codes of oddities and their meanings. The last is a note, all others are warnings."""
+"""Codes of oddities and their meanings. VAL-12 is a note, all others are warnings."""
 
 _NOTES = ("VAL-12",)
 
@@ -106,6 +108,9 @@ def _metadata(picture: Picture, c: Container, place: Place) -> Iterator[Issue]:
         block = c.blocks.get(name)
         if block is not None and not fits(block):
             yield warning(code, f"it has {len(block)} bytes", *place(meta.BLOCKS[name], 0))
+    problem = cicp_problem(picture.blocks["cicp"]) if c.cicp else None
+    if problem is not None:
+        yield warning("VAL-13", problem, *place(meta.CICP_TYPE, 0))
     settings = c.info["settings"] if c.info else ""
     script = picture.timeline.script if picture.timeline else ""
     for text, type_ in ((settings, meta.INFO_TYPE), (script, motn.TYPE)):

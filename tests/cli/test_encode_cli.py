@@ -13,8 +13,9 @@ import OpenImageIO as oiio
 import pytest
 
 import proxyimg_codec as pxi
+from proxyimg_codec.io.png import encode_png, encode_ppm
 from proxyimg_codec.io.psnr import psnr_8bit
-from proxyimg_codec.io.raster import encode_png, encode_ppm, write
+from proxyimg_codec.io.raster import write
 from tests.support.paths import ROOT
 
 TINY = ("-e", "1", "-j", "1")

@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 from conformance import judge, pixels
 from conformance.cases import Case, Render
 from conformance.judge import Ended
-from proxyimg_codec.io import raster
+from proxyimg_codec.io import png
 from tests.conformance.decoders import BY_NAME, CASES, picture
 
 
@@ -40,7 +40,7 @@ def test_what_is_optional_may_be_refused_or_shown():
     assert {case.error for case in optional} == {"invalid", "limit"}
     case = BY_NAME["invalid-tree-circle"]
     right = case.renders[0].expected.read_bytes()
-    wrong = raster.encode_png(pixels.read(right) ^ 0x4000)
+    wrong = png.encode_png(pixels.read(right) ^ 0x4000)
     ends = [
         (ending(4), ""),
         (ending(0, right), ""),
@@ -92,7 +92,7 @@ def test_one_bad_number_is_enough(bad, tmp_path):
         np.save(target, almost)
         return Ended(0)
 
-    (tmp_path / "black.png").write_bytes(raster.encode_png(picture(0, 0, 0)))
+    (tmp_path / "black.png").write_bytes(png.encode_png(picture(0, 0, 0)))
     case = Case("c", "", (), Path(), (Render({}, (), tmp_path / "black.png", 1e9, 1e9),), None)
     result = judge.judge(case, 0, decoder, ".npy")
     assert result.problem == "pixels: not all are finite numbers"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from conformance import pixels
-from proxyimg_codec.io import raster
+from proxyimg_codec.io import png
 from tests.conformance.decoders import picture
 
 
@@ -14,7 +14,7 @@ from tests.conformance.decoders import picture
 def test_png_with_every_filter_is_read(channels):
     rng = np.random.default_rng(0)
     wanted = rng.integers(0, 65536, (7, 6, channels), np.uint16)
-    assert (pixels.read(raster.encode_png(wanted)) == wanted).all()
+    assert (pixels.read(png.encode_png(wanted)) == wanted).all()
     raw = wanted.astype(">u2").view(np.uint8).reshape(7, -1)
     step, above = 2 * channels, np.zeros(raw.shape[1], int)
     for kind in range(5):
@@ -50,11 +50,11 @@ def test_npy_of_other_shapes_is_refused(shape):
 
 
 def test_damaged_png_is_refused():
-    data = raster.encode_png(picture(1, 2, 3))
+    data = png.encode_png(picture(1, 2, 3))
     for i in range(len(data)):
         with pytest.raises(ValueError, match="PNG"):
             pixels.read(data[:i])
         with pytest.raises(ValueError, match=r"PNG|shape"):
             pixels.read(data[:i] + bytes([data[i] ^ 1]) + data[i + 1 :])
     with pytest.raises(ValueError, match="16-bit"):
-        pixels.read(raster.encode_png(picture(1, 2, 3, dtype=np.uint8)))
+        pixels.read(png.encode_png(picture(1, 2, 3, dtype=np.uint8)))

@@ -56,6 +56,28 @@ def test_metadata_is_carried(data, container):
     assert len(changed) < len(data) + 400
 
 
+def test_a_colour_in_numbers_is_carried(data, container):
+    for primaries, transfer in ((9, 16), (1, 255)):
+        values = {"primaries": primaries, "transfer": transfer}
+        changed = serialize(replace(container, cicp=values))
+        assert parse(changed).cicp == values
+        assert len(changed) <= len(data) + 12 + 5
+        image = from_bytes(changed)
+        assert image.blocks["cicp"] == bytes([primaries, transfer, 0, 1])
+        assert image.to_bytes() == changed
+    assert parse(data).cicp is None
+
+
+@pytest.mark.parametrize(
+    "payload", [b"\x92\x00\x0d", b"\x92\x09\xcd\x01\x00", b"\x91\x09", b"\x94\x09\x10\x00\x01",
+                b"\x92\x09\xcc\x10", b"\x82\x09\x10\x00\x01", b"", b"\x92\x09\xc0"],
+)  # fmt: skip
+def test_colours_that_are_none_are_refused(data, payload):
+    chunks = read(data)
+    with pytest.raises(FormatError, match="cICp"):
+        parse(write([*chunks[:-1], Chunk("cICp", payload), chunks[-1]]))
+
+
 def test_metadata_bombs_are_refused(container):
     bomb = meta.compress(b"\0" * 10_000_000)
     assert len(bomb) < 1000

@@ -20,8 +20,9 @@ from proxyimg_codec.encoder.settings import Settings
 from proxyimg_codec.export import openraster as export
 from proxyimg_codec.export.common import at_full_opacity
 from proxyimg_codec.io import xml
+from proxyimg_codec.io.color import to_srgb
+from proxyimg_codec.io.png import encode_png
 from proxyimg_codec.io.psnr import psnr_8bit
-from proxyimg_codec.io.raster import encode_png
 from proxyimg_codec.limits import Limits
 from proxyimg_codec.render.quality import psnr
 from tests.support.pictures import icc, smooth
@@ -471,6 +472,21 @@ def test_bad_files(tool, tmp_path, data, code):
     (tmp_path / "a.ora").write_bytes(data)
     assert str(tmp_path / "a.ora") in tool("encode", tmp_path / "a.ora", code=code).err
     assert not (tmp_path / "a.pxi").exists()
+
+
+def test_layers_of_other_colours_are_converted_or_refused():
+    pq, p3 = ({"cicp": bytes([*two, 0, 1])} for two in ((9, 16), (12, 13)))
+    plain, other = encode_png(smooth(W, H)), encode_png(smooth(W, H), p3)
+    assert read(ora(layer("a") + layer("b"), a=other, b=other)).blocks == p3
+    mixed = read(ora(layer("a") + layer("b"), a=other, b=plain))
+    assert mixed.blocks == {}
+    back, front = mixed.layers
+    np.testing.assert_array_equal(back.pixels, smooth(W, H))
+    wanted = to_srgb(smooth(W, H), p3)
+    np.testing.assert_allclose(front.pixels[..., :3], wanted)
+    for first in (plain, encode_png(smooth(W, H), pq)):
+        data = ora(layer("a") + layer("b"), a=first, b=other)
+        refused(pxi.UnsupportedError, data, "profile", "layer")
 
 
 def test_metadata_is_carried_unless_stripped(tool, tmp_path):

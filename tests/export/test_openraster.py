@@ -179,6 +179,8 @@ def test_colour_profiles_go_with_every_picture(image):
     parts = unzip(openraster.build(changed(image, blocks={"icc": profile, "xmp": b"<x/>"})))
     assert all(b"iCCP" in v for k, v in parts.items() if k.endswith(".png"))
     assert not any(b"<x/>" in v for v in parts.values())
+    parts = unzip(openraster.build(changed(image, blocks={"cicp": bytes([12, 13, 0, 1])})))
+    assert all(b"cICP\x0c\x0d\0\1" in v for k, v in parts.items() if k.endswith(".png"))
 
 
 def test_the_same_bytes_every_time(image):

@@ -11,7 +11,8 @@ import pytest
 
 from proxyimg_codec.errors import InputError, UnsupportedError, UsageError
 from proxyimg_codec.io.metadata import is_cut_jpeg, raw_blocks, upright
-from proxyimg_codec.io.raster import encode_png, read, write
+from proxyimg_codec.io.png import _file, chunks, encode_png
+from proxyimg_codec.io.raster import parse, read, write
 from tests.support.pictures import icc
 
 oiio = pytest.importorskip("OpenImageIO")
@@ -29,6 +30,11 @@ def exif(orientation: int, order: str = "<") -> bytes:
     tags = [(0x0100, 3, 1, 7, 0), (0x0112, 3, 1, orientation, 0), (0x0128, 3, 1, 2, 0)]
     body = b"".join(struct.pack(order + "HHIHH", *t) for t in tags)
     return head + struct.pack(order + "IH", 8, len(tags)) + body + struct.pack(order + "I", 0)
+
+
+def linear(numbers: np.ndarray) -> np.ndarray:
+    """Light of sRGB numbers (IEC 61966-2-1)."""
+    return np.where(numbers <= 0.04045, numbers / 12.92, ((numbers + 0.055) / 1.055) ** 2.4)
 
 
 def noise(channels: int, dtype: str = "uint8", height: int = 7, width: int = 11) -> np.ndarray:
@@ -182,7 +188,7 @@ def test_icc_profiles_pass_through_openimageio(tmp_path, suffix):
 @pytest.mark.parametrize("space", [b"GRAY", b"CMYK"])
 def test_profiles_of_other_colour_spaces_are_left_out(tmp_path, space):
     path = save(tmp_path / "a.tif", noise(1), ICCProfile=icc(space))
-    assert read(path).blocks == {}
+    assert "icc" not in read(path).blocks
 
 
 def jpeg_segment(marker: int, body: bytes) -> bytes:
@@ -279,8 +285,12 @@ def test_premultiplied_sources_become_straight(tmp_path):
     np.testing.assert_allclose(
         read(save(tmp_path / "a.tif", stored)).pixels, straight, rtol=0, atol=1
     )
-    path = save(tmp_path / "a.exr", stored.astype(np.float32) / 255)
-    np.testing.assert_allclose(read(path).pixels * 255, straight, rtol=0, atol=1)
+    alpha = straight[..., 3:] / 255
+    light = np.concatenate([linear(straight[..., :3] / 255) * alpha, alpha], axis=2)
+    path = save(tmp_path / "a.exr", light.astype(np.float32))
+    shown = read(path).pixels
+    np.testing.assert_allclose(shown[..., :3] * 255, straight[..., :3], rtol=0, atol=0.01)
+    np.testing.assert_allclose(shown[..., 3:], alpha, rtol=0, atol=1e-6)
 
 
 def test_straight_sources_stay_as_they_are(tmp_path):
@@ -333,17 +343,86 @@ def test_kinds_of_png(tmp_path, data, expected):
     np.testing.assert_array_equal(pixels, expected)
 
 
+def parts_of(data: bytes) -> list[tuple[bytes, bytes]]:
+    return list(chunks(data))
+
+
+CHANGES = {
+    "no-end": lambda p: p[:-1],
+    "no-pixels": lambda p: [c for c in p if c[0] != b"IDAT"],
+    "no-palette": lambda p: [c for c in p if c[0] != b"PLTE"],
+    "two-palettes": lambda p: [*p[:2], p[1], *p[2:]],
+    "palette-odd": lambda p: [(k, b[:-1] if k == b"PLTE" else b) for k, b in p],
+    "head-short": lambda p: [(k, b[:-1] if k == b"IHDR" else b) for k, b in p],
+    "head-empty": lambda p: [(k, bytes(13) if k == b"IHDR" else b) for k, b in p],
+    "huge": lambda p: [(k, b"\x7f\xff\xff\xff" * 2 + b[8:] if k == b"IHDR" else b) for k, b in p],
+    "depth": lambda p: [(k, b[:8] + b"\x20" + b[9:] if k == b"IHDR" else b) for k, b in p],
+    "rows-few": lambda p: [(k, zlib.compress(bytes(3)) if k == b"IDAT" else b) for k, b in p],
+    "filter": lambda p: [(k, zlib.compress(b"\5\0\0\0\0\0") if k == b"IDAT" else b) for k, b in p],
+    "stream": lambda p: [(k, b[:-5] if k == b"IDAT" else b) for k, b in p],
+    "no-stream": lambda p: [(k, b"rubbish" if k == b"IDAT" else b) for k, b in p],
+}
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_damaged_png_files_are_refused_before_libpng_prints(name, capfd):
+    whole = parts_of(png(3, 8, b"\0\0\1\0\2\0", PLTE=PALETTE))
+    with pytest.raises(InputError, match=r"^a: damaged or truncated \([^\n]+\)$"):
+        parse(_file(CHANGES[name](whole)), "a")
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("kind", [b"PLTE", b"tRNS", b"iCCP", b"gAMA", b"zTXt", b"teST", b"sBIT"])
+def test_chunks_that_are_wrong_or_out_of_place_do_not_matter(kind, capfd):
+    first, *rest = parts_of(encode_png(noise(3)))
+    found = parse(_file([first, (kind, b"\1\2\3" * 9), *rest]), "a")
+    np.testing.assert_array_equal(found.pixels, noise(3))
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("mode", ["L", "P", "RGB", "RGBA", "1"])
+def test_interlaced_png(tmp_path, mode):
+    """The seven passes of the rows that come first, of sizes that some passes miss."""
+    image = pytest.importorskip("PIL.Image")
+    rng = np.random.default_rng(1)
+    for width, height in ((1, 1), (3, 2), (5, 9), (13, 8)):
+        shown = image.fromarray(rng.integers(0, 256, (height, width, 3), np.uint8)).convert(mode)
+        pixels = np.asarray(shown.convert("RGBA" if mode == "RGBA" else "RGB"))
+        depth, kind = {"L": (8, 0), "P": (8, 3), "RGB": (8, 2), "RGBA": (8, 6), "1": (1, 0)}[mode]
+        stored = np.asarray(shown).reshape(height, width, -1)
+        rows = b""
+        for x, y, dx, dy in ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4),
+                             (1, 0, 2, 2), (0, 1, 1, 2)):  # fmt: skip
+            for row in stored[y::dy, x::dx]:
+                if len(row):
+                    rows += b"\0" + (np.packbits(row) if mode == "1" else row).tobytes()
+        head = struct.pack(">IIBBBBB", width, height, depth, kind, 0, 0, 1)
+        palette = [(b"PLTE", bytes(shown.getpalette()))] if mode == "P" else []
+        parts = [(b"IHDR", head), *palette, (b"IDAT", zlib.compress(rows)), (b"IEND", b"")]
+        found = parse(_file(parts), "a").pixels
+        np.testing.assert_array_equal(found, pixels[..., : found.shape[2]])
+
+
 def test_cmyk_becomes_rgb(tmp_path):
     inks = np.zeros((4, 4, 4), np.uint8)
     inks[..., 1:3] = 255  # magenta and yellow make red
     path = save(tmp_path / "a.tif", inks, tiff__ColorSpace="CMYK", channelnames=tuple("CMYK"))
-    np.testing.assert_array_equal(read(path).pixels, np.full((4, 4, 3), RED, np.uint8))
+    picture = read(path)
+    np.testing.assert_array_equal(picture.pixels, np.full((4, 4, 3), RED, np.uint8))
+    assert picture.notes == ("converted from CMYK without a profile",)
 
 
 def test_further_channels_are_left_out(tmp_path):
     pixels = noise(5)
     pixels[..., 3] = 255
     np.testing.assert_array_equal(read(save(tmp_path / "a.tif", pixels)).pixels, pixels[..., :4])
+
+
+@pytest.mark.parametrize("name", ["a.\0png", "a." + "x" * 300, "a.\u732b", "a.\udcff", "a.\n", "-"])
+def test_names_are_for_messages_and_may_be_any(name):
+    np.testing.assert_array_equal(parse(encode_png(noise(3)), name).pixels, noise(3))
+    with pytest.raises(InputError):
+        parse(b"no picture", name)
 
 
 @pytest.mark.parametrize("name", ["a.jpg", "a.dat", "a"])

@@ -4,7 +4,7 @@ import { need, supported, within } from "./errors.js";
 
 const SIGNATURE = [0x89, 0x50, 0x58, 0x49, 0x0d, 0x0a, 0x1a, 0x0a];
 const CRITICAL = ["HEAD", "LAYR", "MESH", "POSE", "NETW", "PLAN", "TEXR"];
-const ANCILLARY = ["iCCp", "eXIf", "xMPd", "iNFO", "tREE", "mOTN", "uNDO"];
+const ANCILLARY = ["iCCp", "eXIf", "xMPd", "cICp", "iNFO", "tREE", "mOTN", "uNDO"];
 
 const CRC = Uint32Array.from({ length: 256 }, (_, n) => {
   for (let k = 0; k < 8; k++) n = n & 1 ? 0xedb88320 ^ (n >>> 1) : n >>> 1;

@@ -12,7 +12,7 @@ from proxyimg_codec.container.chunks import Chunk, write
 
 from ..builders import Numbers, layer, network, picture, texture
 from ..frames import MAGIC, checksum, frame, metadata
-from ..valid.metadata import history, info, scripted, with_chunks
+from ..valid.metadata import colour, history, info, scripted, with_chunks
 from .base import Base, Row, refused
 from .motion import Moving
 
@@ -148,6 +148,12 @@ _OTHERS: list[Row] = [
      _array(meta.INFO_TYPE, "", "", [7])),
     ("invalid-info-area", "a negative area", "", _array(meta.INFO_TYPE, "", "", [7, -1])),
     ("invalid-info-value", "a value too few", "", _array(meta.INFO_TYPE, "", "")),
+    ("invalid-colour-zero", "a colour without primaries", "", _array("cICp", 0, 13)),
+    ("invalid-colour-large", "a transfer of 256", "", _array("cICp", 9, 256)),
+    ("invalid-colour-few", "a colour of one number", "", _array("cICp", 9)),
+    ("invalid-colour-four", "a colour of four numbers", "", _array("cICp", 9, 16, 0, 1)),
+    ("invalid-colour-twice", "two colours", "CON-11",
+     lambda b: with_chunks(b.data, colour(1, 13), colour(1, 13))),
     ("invalid-tree-layer", "a group with the name of a layer", "", _tree(["front"], [0, 0, 0])),
     ("invalid-tree-name", "two groups of one name", "", _tree(["a", "a"], [0, 0, 0, 0])),
     ("invalid-tree-empty", "a group without a name", "", _tree([""], [0, 0, 0])),

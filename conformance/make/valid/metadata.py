@@ -43,6 +43,12 @@ def info(encoder: str = "", settings: str = "", areas: tuple[int, ...] = ()) -> 
     return Chunk(meta.INFO_TYPE, pack(meta.INFO_FIELDS, values))
 
 
+def colour(primaries: int, transfer: int) -> Chunk:
+    """Chunk cICp."""
+    values = {"primaries": primaries, "transfer": transfer}
+    return Chunk(meta.CICP_TYPE, pack(meta.CICP_FIELDS, values))
+
+
 def history(data: bytes, content: bytes, **new: Any) -> Chunk:
     """Chunk uNDO that is bound to the chunks of a file, perhaps with other values."""
     present = read(data)[:-1]
@@ -69,6 +75,17 @@ def _metadata_damaged(n: Numbers) -> bytes:
     return with_chunks(_plain(n), *(metadata(k, v) for k, v in blocks.items()))
 
 
+@_case("A colour of BT.2100 with PQ beside a profile: neither changes a sample",
+       "CHK-1", "MET-19", "MET-20")  # fmt: skip
+def _colour(n: Numbers) -> bytes:
+    return with_chunks(_plain(n), colour(9, 16), metadata("icc", bytes(132)))
+
+
+@_case("A colour whose numbers are unspecified and reserved", "CHK-1", "MET-19")
+def _colour_unknown(n: Numbers) -> bytes:
+    return with_chunks(_plain(n), colour(2, 255))
+
+
 @_case("Frames of several blocks, with a window, without a size, and with a checksum", "CHK-16")
 def _metadata_frames(n: Numbers) -> bytes:
     content = b"<x:xmpmeta>" + b" " * 300_000 + b"</x:xmpmeta>"
@@ -89,7 +106,7 @@ def _metadata_all(n: Numbers) -> bytes:
     groups = Chunk(tree.TYPE, pack(tree.FIELDS, {"groups": ["all"], "parents": [5, 0, 5, 0, 0]}))
     past = history(still, b"", state=bytes(32), size=9, zstd=b"not looked at")
     kinds = [metadata("xmp", b"<x/>"), metadata("exif", _TURNED), metadata("icc", bytes(132))]
-    chunks = [past, *moves, groups, info("x", "{}", (9, 8, 7, 6)), *kinds]
+    chunks = [past, *moves, groups, info("x", "{}", (9, 8, 7, 6)), colour(12, 13), *kinds]
     return with_chunks(still, *(c for chunk in chunks for c in (chunk, Chunk("prIv", b"\0"))))
 
 
