@@ -39,6 +39,14 @@ def _standard(stream: TextIO | None) -> BinaryIO:
     return stream.buffer
 
 
+def temporary_name() -> str:
+    """Name for what is not finished yet, which nobody else uses.
+
+    It is known before anything has it, so that a signal at any time leaves nothing behind.
+    """
+    return f".pxi-{secrets.token_hex(8)}"
+
+
 def write_atomically(path: str | os.PathLike[str], data: bytes) -> None:
     """Writes a file under a temporary name in its folder, and then renames it.
 
@@ -62,7 +70,7 @@ def write_atomically(path: str | os.PathLike[str], data: bytes) -> None:
             return
         target = Path(os.path.realpath(path))
         old = target.stat().st_mode & 0o777 if target.exists() else None
-        temporary = target.with_name(f".pxi-{secrets.token_hex(8)}")
+        temporary = target.with_name(temporary_name())
         # The system takes away what the umask forbids; asking for the umask would set it meanwhile.
         opener = partial(os.open, mode=0o666 if old is None else old)
         with open(temporary, "xb", opener=opener) as stream:
