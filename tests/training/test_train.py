@@ -66,7 +66,7 @@ def test_a_new_model_has_drawn_weights_and_changes_nothing_yet():
     found = [(n, p) for n, p in model.named_parameters() if n.endswith("weight")]
     zero = {n for n, p in found if not p.any()}
     assert zero == {n for n, _ in found if ".third." in n}
-    assert all(level.causal.std() == pytest.approx(0.02, rel=0.1) for level in model.levels)
+    assert all(level.causal.std().item() == pytest.approx(0.02, rel=0.1) for level in model.levels)
     torch.manual_seed(2)
     other = train.drawn(Model())
     assert not torch.equal(model.level(1).mix.weight, other.level(1).mix.weight)
