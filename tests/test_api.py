@@ -122,6 +122,33 @@ def test_an_image_too_large_for_a_reader_pickles():
     assert pickle.loads(pickle.dumps(large)).blocks == large.blocks
 
 
+@pytest.mark.encoder
+def test_copies_of_settings_limits_and_regions(copied):
+    settings = pxi.Settings(effort=7, texture="implicit", quality=31.5)
+    assert copied(settings) == settings
+    assert copied(pxi.Limits(layers=7)) == pxi.Limits(layers=7)
+    region = copied(pxi.Region("é", np.eye(7, 5, dtype=bool)))
+    assert region.name == "é"
+    np.testing.assert_array_equal(region.mask, np.eye(7, 5, dtype=bool))
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        pxi.UsageError("no such layer"),
+        pxi.LimitError("too many", rule="SEC-1"),
+        pxi.FormatError("it is odd", "chunk TEXR", 12, rule="CON-7"),
+        pxi.FormatError("it is odd", offset=7),
+    ],
+    ids=str,
+)
+def test_copies_of_errors(error, copied):
+    """As processes of a pool hand them over."""
+    again = copied(error)
+    assert type(again) is type(error)
+    assert (str(again), vars(again)) == (str(error), vars(error))
+
+
 # Equality
 
 

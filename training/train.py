@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
-from proxyimg_codec.encoder.pyramid.model import Model
+from proxyimg_codec.encoder.pyramid.model import Level, Model, Residual
 from proxyimg_codec.encoder.pyramid.rate import bits_of_integers
 from proxyimg_codec.encoder.pyramid.refine import (
     DEAD_ZONE,
@@ -35,6 +35,19 @@ ROUNDS = 10
 """Rounds of refinement of the latents of a batch in the second phase."""
 
 
+def drawn(model: Model) -> Model:
+    """Draws the initial weights of a model; the residual networks give 0 at first."""
+    for part in model.modules():
+        if isinstance(part, nn.Conv2d):
+            nn.Conv2d.reset_parameters(part)
+        elif isinstance(part, Level):
+            nn.init.normal_(part.causal, std=0.02)
+    for part in model.modules():
+        if isinstance(part, Residual):
+            part.third.reset_parameters()
+    return model
+
+
 def main() -> None:
     """Runs the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -51,7 +64,8 @@ def main() -> None:
     args = parser.parse_args()
     torch.set_num_threads(args.threads)
     torch.manual_seed(args.seed)
-    model = Model()
+    model = drawn(Model())
+    model.set_mode(fast=True)
     model.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     state: dict[str, Any] = {}
     if args.out.exists():

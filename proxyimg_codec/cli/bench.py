@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ..bench.rd import Failure
     from ..bench.rows import Row
 
-RD = """Rate–distortion of every picture of a folder by every codec, in one run: whole files, the
+RD = """Rate-distortion of every picture of a folder by every codec, in one run: whole files, the
 same 8-bit pixels, PSNR and MS-SSIM over RGB, CPU seconds of each call on one thread. DIR receives
 rd.csv (all measurements), summary.csv and summary.md (BD-rates), psnr and msssim as .png and .svg.
 Pictures with transparency are judged on black and on white; codecs without it leave them out."""
@@ -28,7 +28,7 @@ def arguments() -> argparse.ArgumentParser:
     p = parser("pxi-bench", "Measure the codec beside others.")
     rd = p.add_subparsers(dest="benchmark", required=True, metavar="BENCHMARK").add_parser(
         "rd", prog="pxi-bench", usage="pxi-bench rd [options] FOLDER", allow_abbrev=False,
-        help="rate–distortion: BD-rates and plots", description=RD, epilog=EXIT_CODES,
+        help="rate-distortion: BD-rates and plots", description=RD, epilog=EXIT_CODES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
     add = rd.add_argument

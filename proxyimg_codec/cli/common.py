@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import io
 import os
 import sys
@@ -14,9 +15,11 @@ from typing import Any
 from .._version import __version__
 from ..errors import InputError, PxiError, UsageError
 from ..limits import Limits
+from .signals import ending
 
 EXIT_CODES = """exit codes:
-  0 ok, 2 usage, 3 input or output, 4 invalid file, 5 unsupported, 6 limit exceeded, 130 interrupted
+  0 ok, 2 usage, 3 input or output, 4 invalid file, 5 unsupported, 6 limit exceeded,
+  130 interrupted, 143 terminated (129: its terminal was closed)
 """
 
 
@@ -69,14 +72,19 @@ def run(prog: str, work: Callable[[], None]) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
         # Names of layers may have characters that the terminal cannot show.
         sys.stdout.reconfigure(errors="backslashreplace")
+    # Threads of torch that wait must not spin: beside other programs that took 7 times as long.
+    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     try:
-        work()
-        print(end="", flush=True)
+        with ending():
+            work()
+            print(end="", flush=True)
         return 0
     except PxiError as error:
         code, message = error.exit_code, str(error)
     except KeyboardInterrupt:
         code, message = 130, "interrupted"
+    except SystemExit as end:  # raised by `ending` alone
+        code, message = int(end.code or 0), "terminated"
     except MemoryError:
         code, message = 6, "not enough memory; ask for a smaller picture or region"
     except BrokenPipeError:
@@ -91,7 +99,8 @@ def run(prog: str, work: Callable[[], None]) -> int:
         code, message = 3, f"{place}{error.strerror or error}"
     _drop_output()
     if message:
-        print(f"{prog}: {' '.join(message.splitlines())}", file=sys.stderr)
+        with contextlib.suppress(OSError):  # a terminal that was closed
+            print(f"{prog}: {' '.join(message.splitlines())}", file=sys.stderr)
     return code
 
 

@@ -19,7 +19,7 @@ PRESET_NAMES = ("fast", "default", "best", "paper")
 def arguments() -> argparse.ArgumentParser:
     """Parser of the command line."""
     p = parser(
-        "pxi-encode", "Encode a picture as .pxi: layers, Bézier boundaries, fitted textures."
+        "pxi-encode", "Encode a picture as .pxi: layers, Bezier boundaries, fitted textures."
     )
     p.add_argument("input", metavar="IN", help="picture file, .ora file whose layers become "
                    "those of OUT, or - for standard input")  # fmt: skip

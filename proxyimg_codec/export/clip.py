@@ -12,7 +12,6 @@ import itertools
 import math
 import os
 import shutil
-import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from fractions import Fraction
 from pathlib import Path
@@ -22,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, UsageError
+from ..io.files import temporary_name
 from .clip_movies import MOVIES, movie_of
 from .clip_pictures import Numbered, Sheet
 from .clip_target import KINDS, SLOWEST, Target, target_of
@@ -180,11 +180,12 @@ def _staged(target: Target, path: str) -> Iterator[Path]:
     # A symbolic link is kept: the file that it points to is replaced.
     folder = Path(os.path.realpath(target.path)).parent
     made = target.kind == "frames" and not folder.exists()
-    with _explained(path):
-        if made:
-            folder.mkdir()
-        stage = Path(tempfile.mkdtemp(prefix=".pxi-", dir=folder))
+    stage = folder / temporary_name()
     try:
+        with _explained(path):
+            if made:
+                folder.mkdir()
+            stage.mkdir(0o700)
         yield stage
         with _explained(path):
             _settle(stage, target)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
+import secrets
 import sys
-import tempfile
+from functools import partial
 from pathlib import Path
 from typing import BinaryIO, TextIO
 
@@ -37,6 +39,14 @@ def _standard(stream: TextIO | None) -> BinaryIO:
     return stream.buffer
 
 
+def temporary_name() -> str:
+    """Name for what is not finished yet, which nobody else uses.
+
+    It is known before anything has it, so that a signal at any time leaves nothing behind.
+    """
+    return f".pxi-{secrets.token_hex(8)}"
+
+
 def write_atomically(path: str | os.PathLike[str], data: bytes) -> None:
     """Writes a file under a temporary name in its folder, and then renames it.
 
@@ -47,7 +57,7 @@ def write_atomically(path: str | os.PathLike[str], data: bytes) -> None:
         InputError: The file cannot be written; an old file of that name is unchanged.
         BrokenPipeError: Nobody reads the pipe any more.
     """
-    temporary = None
+    temporary: Path | None = None
     try:
         if os.fspath(path) == "-":
             stream = _standard(sys.stdout)
@@ -59,15 +69,16 @@ def write_atomically(path: str | os.PathLike[str], data: bytes) -> None:
                 stream.write(data)
             return
         target = Path(os.path.realpath(path))
-        fd, temporary = tempfile.mkstemp(prefix=".pxi-", dir=target.parent)
-        with os.fdopen(fd, "wb") as stream:
+        old = target.stat().st_mode & 0o777 if target.exists() else None
+        temporary = target.with_name(temporary_name())
+        # The system takes away what the umask forbids; asking for the umask would set it meanwhile.
+        opener = partial(os.open, mode=0o666 if old is None else old)
+        with open(temporary, "xb", opener=opener) as stream:
             stream.write(data)
             stream.flush()
             os.fsync(stream.fileno())
-        umask = os.umask(0)
-        os.umask(umask)
-        mode = target.stat().st_mode & 0o777 if target.exists() else 0o666 & ~umask
-        os.chmod(temporary, mode)
+        if old is not None:
+            os.chmod(temporary, old)  # whatever the umask
         os.replace(temporary, target)
         temporary = None
     except BrokenPipeError:
@@ -76,5 +87,6 @@ def write_atomically(path: str | os.PathLike[str], data: bytes) -> None:
         name = _name(path, "output")
         raise InputError(f"{name}: cannot be written: {error.strerror}") from None
     finally:
-        if temporary is not None and os.path.exists(temporary):
-            os.unlink(temporary)
+        if temporary is not None:
+            with contextlib.suppress(OSError):
+                temporary.unlink()

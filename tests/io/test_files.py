@@ -3,6 +3,7 @@
 import errno
 import os
 import stat
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -13,6 +14,10 @@ from proxyimg_codec.io.files import read_bytes, write_atomically
 
 def full(*args, **kwargs):
     raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def mode(path):
+    return stat.S_IMODE(os.stat(path).st_mode)
 
 
 @pytest.mark.parametrize("step", ["fsync", "chmod", "replace"])
@@ -61,15 +66,52 @@ def test_a_read_only_folder(tmp_path):
     assert path.read_bytes() == b"old"
 
 
-@pytest.mark.parametrize("mask", [0o022, 0o077])
-def test_permissions_follow_the_umask(tmp_path, mask):
-    old = os.umask(mask)
-    try:
-        write_atomically(tmp_path / "a.bin", b"")
-        assert os.umask(mask) == mask
-    finally:
-        os.umask(old)
-    assert stat.S_IMODE((tmp_path / "a.bin").stat().st_mode) == 0o666 & ~mask
+@pytest.fixture(params=[0o000, 0o022, 0o027, 0o077], ids=oct)
+def umask(request):
+    """A umask that is set, after which nobody may set any: it belongs to all threads."""
+    old = os.umask(request.param)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.delattr(os, "umask")
+        yield request.param
+    os.umask(old)
+
+
+def test_permissions_follow_the_umask(tmp_path, umask):
+    write_atomically(tmp_path / "a.bin", b"")
+    assert mode(tmp_path / "a.bin") == 0o666 & ~umask
+
+
+@pytest.mark.parametrize("old", [0o400, 0o604, 0o666])
+def test_a_replaced_file_keeps_its_permissions(tmp_path, monkeypatch, umask, old):
+    path, seen, fsync = tmp_path / "a.bin", [], os.fsync
+    path.write_bytes(b"old")
+    path.chmod(old)
+
+    def noted(fd):
+        seen.append(mode(fd))
+        fsync(fd)
+
+    monkeypatch.setattr(files.os, "fsync", noted)
+    write_atomically(path, b"new")
+    assert mode(path) == old
+    assert seen[0] & ~old == 0  # nobody else could read it meanwhile
+    assert path.read_bytes() == b"new"
+
+
+def test_many_threads_write_at_once(tmp_path, umask):
+    texts = [bytes([k]) * 70_001 for k in range(8)]
+
+    def work(k):
+        for n in range(9):
+            write_atomically(tmp_path / f"{k}-{n}", texts[k])
+            write_atomically(tmp_path / "one", texts[k])
+
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(work, range(8)))
+    assert len(os.listdir(tmp_path)) == 73
+    assert {mode(p) for p in tmp_path.iterdir()} == {0o666 & ~umask}
+    assert all(p.read_bytes() == texts[int(p.name[0])] for p in tmp_path.glob("?-?"))
+    assert read_bytes(tmp_path / "one") in texts
 
 
 def test_the_longest_names_work(tmp_path):

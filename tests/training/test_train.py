@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import torch
 
+from proxyimg_codec.encoder.pyramid.model import Model
 from training import export, pictures, train
 
 
@@ -57,3 +58,15 @@ def test_export_is_what_the_decoder_reads(monkeypatch, folder, tmp_path):
         found.context[0].first.exponent - 1
     )
     assert np.abs(found.to_colour.floats - trained["to_colour"].numpy()).max() < 1e-4
+
+
+def test_a_new_model_has_drawn_weights_and_changes_nothing_yet():
+    torch.manual_seed(1)
+    model = train.drawn(Model())
+    found = [(n, p) for n, p in model.named_parameters() if n.endswith("weight")]
+    zero = {n for n, p in found if not p.any()}
+    assert zero == {n for n, _ in found if ".third." in n}
+    assert all(level.causal.std().item() == pytest.approx(0.02, rel=0.1) for level in model.levels)
+    torch.manual_seed(2)
+    other = train.drawn(Model())
+    assert not torch.equal(model.level(1).mix.weight, other.level(1).mix.weight)

@@ -59,10 +59,9 @@ def complete(
     if stored.all():
         return stored
     try:
-        import torch
+        from ..yielding import torch
     except ImportError:
         raise UnsupportedError("--background complete needs torch") from None
-    torch.set_num_threads(1)  # the order of sums, and so the file, depends on the number of threads
     plane = problem.planes[0]
     codes = _Codes(plane, state, stored)
     pixels, weight = _hidden_pixels(plane, stored)

@@ -138,7 +138,7 @@ def make_trainer(problem: Problem, device: str, jobs: int) -> Trainer:
         return NativeTrainer(problem, jobs)
     from .fit_torch import TorchTrainer
 
-    return TorchTrainer(problem, device, jobs)
+    return TorchTrainer(problem, device)
 
 
 def fit_float(

@@ -31,7 +31,7 @@ CALIBRATION = 1 << 14
 
 
 class NodeTrainer(TorchTrainer):
-    """`Trainer` of a `NodeProblem`, on one thread.
+    """`Trainer` of a `NodeProblem`.
 
     Args:
         problem: The fitting problem.
@@ -42,8 +42,7 @@ class NodeTrainer(TorchTrainer):
     """
 
     def __init__(self, problem: NodeProblem, device: str) -> None:
-        # With more threads, the order of sums, and so the file, would depend on their number.
-        super().__init__(problem, device, jobs=1)
+        super().__init__(problem, device)
         self._layer = self.tensor(problem.layer)
         self._place = self.tensor(problem.place)
         self._corners = self.tensor(problem.corners)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from typing import Any
 
 import numpy as np
@@ -21,22 +20,20 @@ class TorchTrainer:
     Args:
         problem: The fitting problem.
         device: ``cpu`` or ``cuda``.
-        jobs: Most threads.
 
     Raises:
         UnsupportedError: torch is not installed, or finds no CUDA device.
     """
 
-    def __init__(self, problem: Problem, device: str, jobs: int) -> None:
+    def __init__(self, problem: Problem, device: str) -> None:
         try:
-            import torch
+            from ..yielding import torch
         except ImportError:
             raise UnsupportedError(
                 "encoding needs torch here: pip install 'proxyimg-codec[encode]'"
             ) from None
         if device == "cuda" and not torch.cuda.is_available():
             raise UnsupportedError("device cuda: torch finds no CUDA device; use --device cpu")
-        torch.set_num_threads(min(jobs, os.cpu_count() or 1))
         self._torch, self._device, self._shape = torch, device, problem.shape
         self._first = self.tensor(problem.first).long()
         self._taps = [
@@ -135,7 +132,7 @@ class TorchTrainer:
     def _smoothness(self, codes: Any) -> Any:
         """Prior: half the weighted squared distances of codes from the mean of their neighbours."""
         row, neighbours, weight = self._prior
-        off = codes[row] - codes[neighbours].mean(1).detach()
+        off = codes.index_select(0, row) - codes[neighbours].mean(1).detach()
         return (weight[:, None] * off**2).sum() / 2
 
 
@@ -153,9 +150,13 @@ def interpolate(codes: Any, base: Any, stride: Any, fx: Any, fy: Any) -> Any:
         float32 [N, D] features.
     """
     base, fx, fy = base.long(), fx[:, None], fy[:, None]
-    below = base + stride
-    top = codes[base] * (1 - fx) + codes[base + 1] * fx
-    return top * (1 - fy) + (codes[below] * (1 - fx) + codes[below + 1] * fx) * fy
+
+    def row(start: Any) -> Any:
+        # Unlike that of codes[...], the gradient of this does not depend on the number of threads.
+        left, right = codes.index_select(0, start), codes.index_select(0, start + 1)
+        return left * (1 - fx) + right * fx
+
+    return row(base) * (1 - fy) + row(base + stride) * fy
 
 
 def run_network(features: Any, net: list[Any], octaves: int) -> Any:

@@ -108,15 +108,12 @@ def encode(
     model = load(NUMBER)
     job = _Job(model, raster, step)
     complete = True
-    random_state = torch.get_rng_state()
-    torch.manual_seed(seed)
+    random = torch.Generator().manual_seed(seed)  # that of torch belongs to the whole process
     try:
         for window in job.windows():
-            job.refine(window, effort, seed, tick)
+            job.refine(window, effort, seed, random, tick)
     except KeyboardInterrupt:
         complete = False
-    finally:
-        torch.set_rng_state(random_state)
     return job.planes(), complete
 
 
@@ -189,7 +186,10 @@ class _Job:
             for left in range(0, columns, side)
         ]
 
-    def refine(self, box: Window, effort: Effort, seed: int, tick: Callable[[int], None]) -> None:
+    def refine(
+        self, box: Window, effort: Effort, seed: int, random: torch.Generator,
+        tick: Callable[[int], None],
+    ) -> None:  # fmt: skip
         """Refines the latents of a window; those that earlier windows decided stay."""
         now = self._seen(box, self.latents)
         target = self._target(box, now)
@@ -204,7 +204,7 @@ class _Job:
         best = now
         try:
             if effort.steps:
-                best = refine.refined(self.model, target, now, effort.steps, done)
+                best = refine.refined(self.model, target, now, effort.steps, random, done)
             if effort.rounds:
                 best = refine.improved(self.model, target, best, effort.rounds, seed, done)
         finally:

@@ -84,7 +84,7 @@ def high_pass(x: Tensor) -> Tensor:
 
 
 class Model(nn.Module):
-    """Weights of all levels of a model, and its colour transforms.
+    """Weights of all levels, which are 0 until they are loaded, and colour transforms.
 
     Args:
         hidden: Width of the hidden layers of synthesis and analysis.
@@ -239,7 +239,7 @@ class Level(nn.Module):
 
     def __init__(self, hidden: int, context: int) -> None:
         super().__init__()
-        self.integer, self.fast = False, True
+        self.integer = self.fast = False
         self.register_buffer("synthesis_base", synthesis_weights(), persistent=False)
         self.register_buffer("analysis_base", analysis_weights(), persistent=False)
         self.synthesis_delta = nn.Parameter(torch.zeros(12, 12, 5, 5))
@@ -249,17 +249,17 @@ class Level(nn.Module):
         self.synthesis = Residual(12, hidden, 12)
         self.analysis = Residual(12, hidden, 12)
         # Context network
-        self.first = nn.Conv2d(12, context, 3)
+        self.first = _Conv(12, context, 3)
         self.first_by_step = nn.Parameter(torch.zeros(context))
-        self.second = nn.Conv2d(context, context, 3)
-        self.causal = nn.Parameter(torch.randn(context, 18, 3, 5) * 0.02)
+        self.second = _Conv(context, context, 3)
+        self.causal = nn.Parameter(torch.zeros(context, 18, 3, 5))
         mask = torch.ones(3, 5)
         mask[2, 2:] = 0
         self.register_buffer("mask", mask, persistent=False)
-        self.mix = nn.Conv2d(context, context, 1)
-        self.luma = nn.Conv2d(context, 6, 1)
-        self.from_luma = nn.Conv2d(6, context, 1)
-        self.chroma = nn.Conv2d(context, 12, 1)
+        self.mix = _Conv(context, context, 1)
+        self.luma = _Conv(context, 6, 1)
+        self.from_luma = _Conv(6, context, 1)
+        self.chroma = _Conv(context, 12, 1)
 
     def gains(self, q: Tensor) -> Tensor:
         """Gains of the bands, [B, 9, 1, 1], for a result of `log_step`."""
@@ -360,6 +360,14 @@ def convolve(x: Tensor, w: Tensor, b: Tensor | None, pad: tuple[int, int], fast:
     return F.conv2d(x.to(half), w.to(half), None if b is None else b.to(half), padding=pad)
 
 
+class _Conv(nn.Conv2d):
+    """Convolution with weights of 0: to draw them takes random numbers of the whole process."""
+
+    def reset_parameters(self) -> None:
+        for p in self.parameters():
+            nn.init.zeros_(p)
+
+
 class Residual(nn.Module):
     """Network of three convolutions: 3 x 3, 1 x 1 and 3 x 3. Its initial output is 0.
 
@@ -374,12 +382,10 @@ class Residual(nn.Module):
 
     def __init__(self, inputs: int, hidden: int, outputs: int) -> None:
         super().__init__()
-        self.first = nn.Conv2d(inputs, hidden, 3)
+        self.first = _Conv(inputs, hidden, 3)
         self.by_step = nn.Parameter(torch.zeros(hidden))
-        self.second = nn.Conv2d(hidden, hidden, 1)
-        self.third = nn.Conv2d(hidden, outputs, 3)
-        nn.init.zeros_(self.third.weight)
-        nn.init.zeros_(self.third.bias)  # type: ignore[arg-type]  # torch's stubs
+        self.second = _Conv(hidden, hidden, 1)
+        self.third = _Conv(hidden, outputs, 3)
 
     def forward(self, x: Tensor, q: Tensor, fast: bool, quantized: bool = False) -> Tensor:
         """Runs the network.

@@ -72,12 +72,13 @@ def shrunk(latents: Sequence[Tensor], by: float) -> list[Tensor]:
     return [y - y.clamp(-by, by) for y in latents[:-1]] + [latents[-1]]
 
 
-def relaxed(latents: Sequence[Tensor], temperature: float) -> list[Tensor]:
+def relaxed(latents: Sequence[Tensor], temperature: float, random: torch.Generator) -> list[Tensor]:
     """Rounds latents stochastically, by Gumbel annealing (Yang, Bamler, Mandt 2020, section 3).
 
     Args:
         latents: Latents.
         temperature: Temperature; near 0, results are near integers.
+        random: Generator that chooses the integers.
 
     Returns:
         Latents between the integers beside them, differentiable.
@@ -88,7 +89,7 @@ def relaxed(latents: Sequence[Tensor], temperature: float) -> list[Tensor]:
         share = (y - low).clamp(1e-4, 1 - 1e-4)
         # atanh(r) - atanh(1 - r) with a single logarithm
         logit = 0.5 * torch.log(share * (1 + share) / ((1 - share) * (2 - share)))
-        noise = torch.rand_like(y).clamp(1e-6, 1 - 1e-6)
+        noise = torch.empty_like(share).uniform_(generator=random).clamp_(1e-6, 1 - 1e-6)
         gumbel = torch.log(noise / (1 - noise))
         chosen.append(low + torch.sigmoid((logit + gumbel) / temperature))
     return chosen
@@ -128,7 +129,7 @@ def cost(model: Model, target: Target, latents: Sequence[Tensor], smooth: bool =
     spent = torch.zeros(len(target.step))
     for y, p, mask in zip(latents, likely, masks, strict=False):
         own = count(y, *p)
-        spent = spent + (own if mask is None else own * mask).sum((1, 2, 3))
+        spent = spent + sums(own if mask is None else own * mask)
     shown = model.synthesise(list(latents), target.step, target.picture.shape[2:])
     if target.similarity is not None:
         weight = 1.0 if target.weight is None else target.weight
@@ -137,7 +138,12 @@ def cost(model: Model, target: Target, latents: Sequence[Tensor], smooth: bool =
     error = (shown - target.picture) ** 2
     if target.weight is not None:
         error = error * target.weight
-    return Cost(error.sum((1, 2, 3)) / target.step**2, spent, likely)
+    return Cost(sums(error) / target.step**2, spent, likely)
+
+
+def sums(x: Tensor) -> Tensor:
+    """Sums [B] of [B, C, h, w], the same for any number of threads: no channel is divided."""
+    return x.sum((2, 3)).sum(1)
 
 
 @torch.no_grad()
@@ -149,8 +155,9 @@ def structural(model: Model, target: Target, latents: Sequence[Tensor]) -> Targe
 
 
 def refined(
-    model: Model, target: Target, start: Sequence[Tensor], steps: int, tick: Callable[[], None]
-) -> list[Tensor]:
+    model: Model, target: Target, start: Sequence[Tensor], steps: int, random: torch.Generator,
+    tick: Callable[[], None],
+) -> list[Tensor]:  # fmt: skip
     """Refines latents by gradient descent with stochastic rounding.
 
     Args:
@@ -158,6 +165,7 @@ def refined(
         target: Target of the latents.
         start: Latents of levels 1, 2, ..., then the lowest planes.
         steps: Number of steps.
+        random: Generator of the stochastic rounding.
         tick: Called after each step; `KeyboardInterrupt`, from there or elsewhere, passes through.
 
     Returns:
@@ -171,7 +179,7 @@ def refined(
     for turn in range(steps):
         share = turn / steps
         own.param_groups[0]["lr"] = RATE * annealed(share)
-        chosen = held(relaxed(latents, temperature(share)), fixed, target)
+        chosen = held(relaxed(latents, temperature(share), random), fixed, target)
         own.zero_grad(set_to_none=True)
         cost(model, target, chosen).total.backward()  # type: ignore[no-untyped-call]  # torch's stubs
         own.step()

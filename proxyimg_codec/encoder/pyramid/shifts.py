@@ -29,7 +29,7 @@ class Sample(NamedTuple):
     def bits(self, shift: int) -> float:
         """Bits of the sample with a shift of the scale index."""
         scale = (self.log_scale + shift / 8).clamp(*LOG_SCALES)
-        return float((bits_at(self.offset, scale) * self.mask).sum())
+        return float((bits_at(self.offset, scale) * self.mask).sum((2, 3)).sum())
 
 
 def best_shift(samples: list[Sample]) -> int:

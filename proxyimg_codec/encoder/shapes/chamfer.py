@@ -85,9 +85,8 @@ def _descend(
     Returns:
         float64 [3m, 2] control points in long sides of the canvas.
     """
-    import torch
+    from ..yielding import torch
 
-    torch.set_num_threads(1)  # with so little work, threads mostly wait for each other
     target = torch.from_numpy(contour).float()
     count = 3 * min(segments, max(2, len(contour) // 3))
     control = target[torch.arange(count) * len(target) // count]

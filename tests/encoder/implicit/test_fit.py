@@ -47,7 +47,7 @@ def test_kernel_and_torch_take_the_same_steps(channels, bits):
     p = problem(channels)
     steps = 1 if bits else 3  # rounding turns tiny differences into steps of a symbol
     (a, loss_a), (b, loss_b) = (
-        after(t, p, bits, steps) for t in (NativeTrainer(p, 1), TorchTrainer(p, "cpu", 1))
+        after(t, p, bits, steps) for t in (NativeTrainer(p, 1), TorchTrainer(p, "cpu"))
     )
     assert loss_a == pytest.approx(loss_b, rel=1e-3)
     start = fit.initial(p, 0)

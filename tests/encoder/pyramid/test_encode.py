@@ -120,9 +120,9 @@ def test_refinement_lowers_the_cost():
         with torch.no_grad():
             return float(refine.cost(net, target, [torch.round(y) for y in latents], False).total)
 
-    torch.manual_seed(0)
+    random = torch.Generator().manual_seed(0)
     greedy = refine.improved(net, target, start, 6, 0, lambda: None)
-    annealed = refine.refined(net, target, start, 12, lambda: None)
+    annealed = refine.refined(net, target, start, 12, random, lambda: None)
     both = refine.improved(net, target, annealed, 6, 0, lambda: None)
     assert costs(greedy) < 0.97 * costs(start)
     assert costs(both) < costs(annealed)
@@ -147,12 +147,12 @@ def test_shifts_take_the_fewest_bits():
 
 
 def test_relaxed_latents_lie_between_their_neighbours():
-    torch.manual_seed(0)
-    y = torch.randn(1, 9, 8, 8) * 3
-    (chosen,) = refine.relaxed([y], 0.3)
+    random = torch.Generator().manual_seed(0)
+    y = torch.randn(1, 9, 8, 8, generator=random) * 3
+    (chosen,) = refine.relaxed([y], 0.3, random)
     assert (chosen >= torch.floor(y)).all()
     assert (chosen <= torch.floor(y) + 1).all()
-    cold = torch.stack([refine.relaxed([y], 1e-3)[0] for _ in range(64)]).mean(0)
+    cold = torch.stack([refine.relaxed([y], 1e-3, random)[0] for _ in range(64)]).mean(0)
     # Drawn up as often as the fraction is large.
     near = (y - torch.floor(y)) > 0.9
     assert (cold - torch.floor(y))[near].mean() > 0.8

@@ -5,9 +5,10 @@ import math
 import numpy as np
 import pytest
 import torch
+from torch.nn import functional
 
 from proxyimg_codec.encoder.pyramid import rate
-from proxyimg_codec.encoder.pyramid.load import load
+from proxyimg_codec.encoder.pyramid.load import load, native_bfloat16
 from proxyimg_codec.encoder.pyramid.model import LEVELS, Model, plain_synthesis
 from proxyimg_codec.encoder.pyramid.similarity import ms_ssim
 from proxyimg_codec.entropy import laplace
@@ -17,6 +18,7 @@ from proxyimg_codec.texture.latents import Latents
 from proxyimg_codec.texture.planes import encoded
 
 STEP = 300
+conv2d = functional.conv2d
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +31,7 @@ def exact(shipped):
     """The model with float32 convolutions and whole activations, as in the decoder."""
     shipped.set_mode(fast=False, integer=True)
     yield shipped
-    shipped.set_mode(fast=True, integer=False)
+    shipped.set_mode(fast=native_bfloat16(), integer=False)
 
 
 def picture(height=128, width=192):
@@ -56,7 +58,6 @@ def whole(latents):
 @pytest.mark.parametrize("size", [(128, 192), (127, 193), (50, 99), (33, 17), (2, 5), (1, 70)])
 def test_untrained_transform_reconstructs_perfectly(size):
     net = Model()
-    net.set_mode(fast=False)
     shown = picture(*size)
     with torch.no_grad():
         found = net.analyse(shown, step_of(256), LEVELS - 1)
@@ -78,11 +79,37 @@ def test_synthesis_is_the_decoders(exact, size):
 def test_bfloat16_hardly_changes_the_picture(shipped):
     found = latents_of(shipped)
     with torch.no_grad():
-        fast = shipped.synthesise(found, step_of(STEP), (128, 192))
-        shipped.set_mode(fast=False)
-        slow = shipped.synthesise(found, step_of(STEP), (128, 192))
-        shipped.set_mode(fast=True)
-    assert (fast - slow).abs().max() < 1
+        now = {}
+        for fast in (True, False):
+            shipped.set_mode(fast=fast)
+            now[fast] = shipped.synthesise(found, step_of(STEP), (128, 192))
+        shipped.set_mode(fast=native_bfloat16())
+    assert 0 < (now[True] - now[False]).abs().max() < 1
+
+
+@pytest.mark.parametrize(
+    ("capabilities", "fast"),
+    [
+        ({"avx2": True, "avx512_f": True, "avx512_bf16": False, "amx_bf16": False}, False),
+        ({"avx512_bf16": True, "amx_bf16": False}, True),
+        ({"avx512_bf16": False, "amx_bf16": True}, True),
+        ({"architecture": "arm64", "neon": True, "bf16": True}, False),
+        (None, False),
+    ],
+)
+def test_bfloat16_is_used_where_the_processor_has_it(monkeypatch, capabilities, fast):
+    if capabilities is None:  # older versions of torch do not tell
+        monkeypatch.delattr(torch.cpu, "get_capabilities", raising=False)
+    else:
+        monkeypatch.setattr(torch.cpu, "get_capabilities", lambda: capabilities, raising=False)
+    seen = []
+    monkeypatch.setattr(
+        functional, "conv2d", lambda x, *a, **k: seen.append(x.dtype) or conv2d(x, *a, **k)
+    )
+    model = load.__wrapped__(1)
+    with torch.no_grad():
+        model.likelihoods(latents_of(model), step_of(STEP))
+    assert (torch.bfloat16 in seen) == fast
 
 
 @pytest.mark.parametrize("size", [(24, 32), (23, 31), (24, 31)])
