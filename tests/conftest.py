@@ -21,14 +21,14 @@ from tests.support.tools import Ran, one_line
 # Programs that tests start inherit it.
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
-ENCODE = ("cv2", "OpenImageIO", "onnx", "torch", "tqdm")
+ENCODE = ("cv2", "OpenImageIO", "onnx", "PIL", "torch", "tqdm")
 """What the extra ``encode`` installs."""
 
 KINDS = {
     "encoder": ("encoder", ENCODE),
     "training": ("encoder", ENCODE),
     "benchmarks": ("encoder", ENCODE),
-    "bench": ("encoder", (*ENCODE, "imagecodecs", "matplotlib", "PIL")),
+    "bench": ("encoder", (*ENCODE, "imagecodecs", "matplotlib")),
     "cli/test_encode_cli.py": ("encoder", ENCODE),
     "test_docs.py": ("encoder", ENCODE),
     "web": ("browser", ()),

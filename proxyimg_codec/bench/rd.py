@@ -208,7 +208,7 @@ def _measure(source: Source, codec: Codec, task: Task) -> Row:
     pixels = _pixels(source.path)
     encode = codec.encode
     if codec.masks:
-        from ..encoder.shapes.masks import load_masks
+        from ..encoder.shapes.mask_files import load_masks
 
         encode = partial(encode, masks=load_masks(str(source.masks), source.width, source.height))
     _warm(codec)

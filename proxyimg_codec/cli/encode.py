@@ -158,7 +158,7 @@ def encoded(source: bytes, args: argparse.Namespace, settings: Any, bar: Bar) ->
     from ..encoder.encode import encode
     from ..encoder.import_layers import composite, encode_layers
     from ..encoder.openraster import is_openraster, read_openraster
-    from ..encoder.shapes.masks import load_masks
+    from ..encoder.shapes.mask_files import load_masks
     from ..io.raster import parse
 
     seen = 0

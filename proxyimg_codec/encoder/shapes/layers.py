@@ -161,8 +161,6 @@ def _check_masks(masks: Sequence[Region]) -> None:
     for region in masks:
         if not 1 <= len(region.name) <= 200 or not region.name.isprintable():
             raise InputError(f"mask name {region.name!r} must be 1..200 printable characters")
-        if region.mask.dtype != bool:
-            raise InputError(f"mask {region.name!r} is not an array of bool")
 
 
 def _translucent(alpha: Floats) -> NDArray[np.bool_]:
