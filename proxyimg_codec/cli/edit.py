@@ -100,18 +100,16 @@ def _edited(picture: Picture, operations: Sequence[Values]) -> Picture:
 
     Error messages count the operations from 1; each operation of a script counts by itself.
     """
-    from ..edit.history import undone
-    from ..edit.script import apply
+    from ..edit.script import Row
 
-    number = 1
+    row = Row(picture)
     for values in operations:
         if "undo" in values:
-            picture = undone(picture, values["undo"])
-            continue
-        edits = values.get("script", [values])
-        picture = apply(picture, edits, number)
-        number += len(edits)
-    return picture
+            row.undo(values["undo"])
+        else:
+            for edit in values.get("script", [values]):
+                row.apply(edit)
+    return row.picture
 
 
 def _report(args: argparse.Namespace, picture: Picture, size: int, seconds: float) -> None:

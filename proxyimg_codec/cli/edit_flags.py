@@ -144,12 +144,20 @@ def _named(op: str) -> Callable[[str], Values]:
     return lambda layer: {"op": op, "layer": key(layer)}
 
 
-def _assigned(op: str, name: str) -> Callable[[str], Values]:
-    """Function that parses NAME=VALUE, or NAME alone, for operation `op` with parameter `name`."""
+def _assigned(
+    op: str, name: str, kind: Callable[[str], str | int] = str
+) -> Callable[[str], Values]:
+    """Function that parses NAME=VALUE, or NAME alone, for operation `op`.
+
+    Args:
+        op: The operation.
+        name: Its parameter that gets the value.
+        kind: Function that parses the value.
+    """
 
     def parse(text: str) -> Values:
         layer, given, value = text.rpartition("=") if "=" in text else (text, "", "")
-        return {"op": op, "layer": key(layer), **({name: value} if given else {})}
+        return {"op": op, "layer": key(layer), **({name: kind(value)} if given else {})}
 
     return parse
 
@@ -167,7 +175,7 @@ def _texture(text: str) -> Values:
         source, values["fit"] = source.removesuffix("@shape"), "shape"
     if parts := re.fullmatch(r"(.+?\.pxi):(.+)", source, re.IGNORECASE):
         return {**values, "source": parts[1], "from_layer": key(parts[2])}
-    return {**values, "source": source}
+    return {**values, "source": key(source)}
 
 
 def _recolour(layer: str, changes: str) -> Values:
@@ -240,7 +248,8 @@ FLAGS = (
         "hue:DEG, saturation:F, brightness:F, #rrggbb (shades of a colour); several with commas"),
     Flag("--group", _group, ["NAME=A,B,..."], "put layers into a group"),
     Flag("--ungroup", _ungroup, ["NAME"], "dissolve a group"),
-    Flag("--parent", _assigned("parent", "to"), ["NAME=PARENT"], "let a layer follow another one"),
+    Flag("--parent", _assigned("parent", "to", key), ["NAME=PARENT"],
+        "let a layer follow another one"),
     Flag("--script", _script, ["FILE"], "edits from a JSON file"),
     Flag("--undo", _undo, ["N"], "take back the last N edits"),
 )  # fmt: skip
