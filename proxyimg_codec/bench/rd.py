@@ -88,7 +88,8 @@ def find(folder: Path, chosen: str | None = None, masks: Path | None = None) -> 
     for place in (folder, masks):
         if place is not None and not place.is_dir():
             raise InputError(f"{place}: is not a folder")
-    files = sorted(p for p in folder.iterdir() if p.suffix.lower() in SUFFIXES and p.is_file())
+    seen = (p for p in folder.iterdir() if not p.name.startswith("."))
+    files = sorted(p for p in seen if p.suffix.lower() in SUFFIXES and p.is_file())
     if not files:
         raise InputError(f"{folder}: holds no pictures ({', '.join(SUFFIXES)})")
     names = [p.stem for p in files]

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError, UsageError
-from .common import EXIT_CODES, Bar, parser, run
+from .common import EXIT_CODES, Bar, parser, printable, run
 
 if TYPE_CHECKING:
     from ..bench.peers import Codec
@@ -115,7 +115,8 @@ def rate_distortion(args: argparse.Namespace, command: str) -> None:
                 f"--reuse {log.path} goes on from there")  # fmt: skip
     if log.rows:
         published = args.published or report.is_kodak(sources)
-        say(report.write(out, log.rows, chosen, folder.resolve().name, rates, published))
+        name = printable(folder.resolve().name)
+        say(report.write(out, log.rows, chosen, name, rates, published))
     if log.failures:
         raise InputError(f"{len(log.failures)} of {len(tasks)} measurements failed, "
                          f"the first: {log.failures[0].message}")  # fmt: skip

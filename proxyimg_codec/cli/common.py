@@ -10,7 +10,7 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import fields
-from typing import Any
+from typing import Any, NoReturn
 
 from .._version import __version__
 from ..errors import PxiError, UsageError
@@ -21,9 +21,16 @@ EXIT_CODES = """exit codes:
 """
 
 
+class _Parser(argparse.ArgumentParser):
+    """Parser whose errors are safe for a terminal."""
+
+    def error(self, message: str) -> NoReturn:
+        super().error(printable(message))
+
+
 def parser(prog: str, description: str) -> argparse.ArgumentParser:
     """Creates an argument parser in the style of all tools."""
-    p = argparse.ArgumentParser(
+    p = _Parser(
         prog, description=description, epilog=EXIT_CODES,
         formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False,
     )  # fmt: skip

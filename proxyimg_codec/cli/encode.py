@@ -73,7 +73,12 @@ def _add_aims(p: argparse.ArgumentParser) -> None:
 def _add_decomposition(p: argparse.ArgumentParser) -> None:
     """Adds the flags that decide about layers, boundaries and meshes."""
     add = p.add_argument
-    add("--masks", metavar="PATH", help="folder of mask PNGs, or one label PNG: the layers to make")
+    add(
+        "--masks",
+        metavar="PATH",
+        help="the layers to make: a folder of masks, or one picture "
+        "of labels (palette or grey: 0 is the back, 1, 2, ... are objects)",
+    )
     add("--max-layers", type=int, metavar="N", help="most layers found; default 4")
     add("--layers", type=int, choices=[1], help="1: one layer, no decomposition")
     add("--segmenter", metavar="NAME", help="who finds layers; default regions, "
