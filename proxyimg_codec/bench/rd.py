@@ -197,10 +197,14 @@ def measure(task: Task) -> Row | Failure:
     try:
         return _measure(source, codec, task)
     except PxiError as error:
-        return Failure(f"{where}: {error}")
+        return Failure(f"{where}: {_line(error)}")
     except Exception as error:
         # Foreign codecs raise errors of any class; the other measurements must not be lost.
-        return Failure(f"{where}: {type(error).__name__}: {error}")
+        return Failure(f"{where}: {type(error).__name__}: {_line(error)}")
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).splitlines())
 
 
 def _measure(source: Source, codec: Codec, task: Task) -> Row:

@@ -109,7 +109,8 @@ def _read_oiio(data: bytes, name: str) -> tuple[Pixels, bytes, int]:
     wanted.attribute("oiio:UnassociatedAlpha", 1)
     # OpenImageIO finds the reader of a type by trying. All readers work on files, but not all on
     # memory.
-    with tempfile.NamedTemporaryFile(suffix=Path(name).suffix) as file, _silent_stderr():
+    hint = Path(name).suffix if name.isascii() else ""
+    with tempfile.NamedTemporaryFile(suffix=hint) as file, _silent_stderr():
         file.write(data)
         file.flush()
         source = oiio.ImageInput.open(file.name, wanted)
@@ -265,6 +266,8 @@ def _encode_oiio(kind: str, pixels: Pixels, blocks: dict[str, bytes]) -> bytes:
     oiio = _import_oiio()
     if not kind:
         raise UsageError("the output has no suffix; name it .png, .jpg, .tif or the like")
+    if not kind.isascii():  # OpenImageIO takes no names that are not UTF-8
+        raise UnsupportedError(f"files of type {kind} cannot be written")
     with tempfile.TemporaryDirectory() as folder, _silent_stderr():
         name = str(Path(folder) / f"picture{kind}")
         target = oiio.ImageOutput.create(name)

@@ -259,6 +259,17 @@ def test_odd_names_of_pictures(tool, here, name):
     assert os.listdir("out") == [f"{name}.pxi"]
 
 
+@encoder
+@pytest.mark.parametrize("suffix", [".\udcff", ".png\n", ".é", ".pn\x1b"])
+def test_odd_suffixes(tool, here, suffix):
+    png("a.png"), shutil.copy("a.png", f"b{suffix}")
+    tool("encode", *TINY, f"b{suffix}")
+    assert pxi.open(f"b{suffix}.pxi").width == 19
+    assert printable(suffix) in tool("decode", f"b{suffix}.pxi", f"c{suffix}", code=5).err
+    assert printable(suffix) in tool("edit", "--bake", f"b{suffix}.pxi", f"c{suffix}", code=5).err
+    tool("encode", *TINY, f"b{suffix}", f"c{suffix}", code=2)
+
+
 def test_a_negative_name_needs_no_dashes_in_pxi_edit(tool, picture):
     picture("-5.pxi")
     tool("edit", "-5.pxi", "--move", "-1", "-.5,-3", "-6.pxi")
