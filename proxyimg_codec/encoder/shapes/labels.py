@@ -38,13 +38,15 @@ def label_regions(image: NDArray[Any], where: str) -> list[Region]:
         InputError: There are negative numbers, too many labels, or colours without black; or the
             picture was smoothed, so that mixed values lie along its edges.
     """
-    values = image.astype(np.int64).reshape(*image.shape[:2], -1)
+    values = image.reshape(*image.shape[:2], -1)
     if values.min() < 0:
         raise InputError(f"{where}: labels must be 0, 1, 2, ...; there is {values.min()}")
     if values.shape[2] == 3 and (values == values[..., :1]).all():
         values = values[..., :1]
     colours = values.shape[2] == 3
-    packed = values @ np.array([1 << 16, 1 << 8, 1]) if colours else values[..., 0]
+    packed = values[..., 0].astype(np.int32) if colours else values[..., 0]
+    for channel in range(1, values.shape[2]):
+        packed = packed << 8 | values[..., channel]
     found = np.unique(packed)
     _check_flat(values, packed, found, where)
     if colours and found[0] != 0:
@@ -54,13 +56,13 @@ def label_regions(image: NDArray[Any], where: str) -> list[Region]:
         )
     labels = np.arange(len(found)) if colours else found
     return [
-        Region("back" if label == 0 else f"object {label}", packed == value)
+        Region("back" if label == 0 else f"object {int(label)}", packed == value)
         for label, value in zip(labels, found, strict=True)
     ]
 
 
 def _check_flat(
-    values: NDArray[np.int64], labels: NDArray[np.int64], found: NDArray[np.int64], where: str
+    values: NDArray[Any], labels: NDArray[Any], found: NDArray[Any], where: str
 ) -> None:
     """Refuses pictures that were smoothed, scaled with interpolation or saved with loss.
 
@@ -90,13 +92,15 @@ def _check_flat(
         )
 
 
-def _mixed(values: NDArray[np.int64]) -> tuple[int, int]:
+def _mixed(values: NDArray[Any]) -> tuple[int, int]:
     """Numbers of pixels on edges, and of those whose colour lies between both neighbours'."""
     edges = mixed = 0
     for v in (values, values.transpose(1, 0, 2)):
         before, now, after = v[:-2], v[1:-1], v[2:]
         unlike, unlike2 = (now != before).any(2), (now != after).any(2)
-        low, high = np.minimum(before, after), np.maximum(before, after)
         edges += int((unlike | unlike2).sum())
-        mixed += int((unlike & unlike2 & ((low <= now) & (now <= high)).all(2)).sum())
+        # Few pixels are unlike both neighbours.
+        one, this, other = (w[unlike & unlike2] for w in (before, now, after))
+        between = (np.minimum(one, other) <= this) & (this <= np.maximum(one, other))
+        mixed += int(between.all(1).sum())
     return edges, mixed
