@@ -18,6 +18,12 @@ from .labels import label_regions
 from .mask_arrays import inside, warn_of_soft
 from .masks import BACK_NAMES, Region, check_size
 
+TYPES = (
+    ".bmp", ".gif", ".jfif", ".jp2", ".jpeg", ".jpg", ".npy", ".pbm", ".pgm", ".png", ".pnm", ".ppm",
+    ".tga", ".tif", ".tiff", ".webp",
+)  # fmt: skip
+"""Suffixes of the files of a mask folder that are masks."""
+
 _PALETTES = ("P", "PA")
 _COLOUR = ("RGB", "RGBA")
 _ORIENTATION = 0x0112
@@ -45,7 +51,7 @@ def load_masks(path: str | Path, width: int, height: int) -> list[Region]:
     """Reads the masks that a user made for a picture.
 
     A folder holds the mask of one layer in each picture file; files whose names begin with a dot,
-    and what is no picture, are passed over. The natural order of the file names is back to front,
+    and what is no picture of pixels, are passed over. The natural order of the file names is back to front,
     with `back` or `background` first. A region has the name of its file without a number in front:
     `2 cat.png` is `cat`. Inside is where alpha is at least one half if the file has transparency;
     otherwise what is not index 0 of a palette with colours; otherwise what is at least half as
@@ -94,11 +100,12 @@ def _mask_files(folder: Path) -> list[Path]:
         seen = [f for f in folder.iterdir() if not f.name.startswith(".")]
     except OSError as error:
         raise InputError(f"{folder}: cannot be read: {error.strerror}") from None
-    files = [f for f in seen if is_picture(f) and not f.is_dir()]
+    files = [f for f in seen if f.suffix.lower() in TYPES and not f.is_dir()]
     if not files:
         raise InputError(f"{folder}: the mask folder holds no picture; put one mask a layer in it")
-    for inner in sorted(f for f in seen if f.is_dir()):
-        logging.getLogger(__name__).warning("%s: a folder among the masks is left out", inner)
+    for other in sorted(f for f in seen if f.is_dir() or (is_picture(f) and f not in files)):
+        kind = "a folder among the masks" if other.is_dir() else "no type of masks"
+        logging.getLogger(__name__).warning("%s: %s; it is left out", other, kind)
     return sorted(files, key=_stack_order)
 
 

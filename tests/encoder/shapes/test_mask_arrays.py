@@ -128,6 +128,13 @@ def test_what_is_no_mask_is_refused(masks, why):
     assert why in str(caught.value)
 
 
+@pytest.mark.parametrize("name", [3, None, b"fox", "", "a\nb", "x" * 201])
+def test_names_are_texts(name):
+    pixels = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
+    with pytest.raises(InputError, match="printable"):
+        pxi.encode(pixels, masks=[Region(name, ONE)], effort=1)
+
+
 def test_encode_takes_them_all_and_says_what_it_wants():
     pixels = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
     pixels[ONE], pixels[TWO] = (200, 30, 30), (20, 60, 220)

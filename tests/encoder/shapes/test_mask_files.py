@@ -180,7 +180,12 @@ def test_what_is_no_mask_is_passed_over(tmp_path, caplog):
     assert not caplog.records
     (tmp_path / "more.png").mkdir()
     assert list(load(tmp_path)) == ["cat"]
-    assert "more.png: a folder among the masks is left out" in caplog.text
+    assert "more.png: a folder among the masks; it is left out" in caplog.text
+    for name in ("shapes.svg", "all.ora", "deep.exr"):
+        (tmp_path / name).write_bytes(b"no mask")
+    assert list(load(tmp_path)) == ["cat"]
+    assert "deep.exr: no type of masks; it is left out" in caplog.text
+    assert len(caplog.records) == 1 + 4
     (tmp_path / "cat.png").unlink()
     with pytest.raises(InputError, match="holds no picture"):
         load(tmp_path)
