@@ -19,8 +19,8 @@ from .mask_arrays import inside, warn_of_soft
 from .masks import BACK_NAMES, Region, check_size
 
 TYPES = (
-    ".bmp", ".gif", ".jfif", ".jp2", ".jpeg", ".jpg", ".npy", ".pbm", ".pgm", ".png", ".pnm", ".ppm",
-    ".tga", ".tif", ".tiff", ".webp",
+    ".bmp", ".gif", ".jfif", ".jp2", ".jpeg", ".jpg", ".npy", ".pbm", ".pgm", ".png", ".pnm",
+    ".ppm", ".tga", ".tif", ".tiff", ".webp",
 )  # fmt: skip
 """Suffixes of the files of a mask folder that are masks."""
 
@@ -51,7 +51,7 @@ def load_masks(path: str | Path, width: int, height: int) -> list[Region]:
     """Reads the masks that a user made for a picture.
 
     A folder holds the mask of one layer in each picture file; files whose names begin with a dot,
-    and what is no picture of pixels, are passed over. The natural order of the file names is back to front,
+    and what is no picture, are passed over. The natural order of the file names is back to front,
     with `back` or `background` first. A region has the name of its file without a number in front:
     `2 cat.png` is `cat`. Inside is where alpha is at least one half if the file has transparency;
     otherwise what is not index 0 of a palette with colours; otherwise what is at least half as
