@@ -156,8 +156,9 @@ def _edited(picture: Picture, operations: Sequence[Values], quiet: bool) -> Pict
             for edit in values.get("script", [values]):
                 row.apply(edit)
                 if edit["op"] == "drag" and len(edit["handles"]) == 1 and not quiet:
-                    print(f"pxi-edit: one point moves all of {edit['layer']!r} and bends nothing; "
-                          "points with :0,0 stay", file=sys.stderr)  # fmt: skip
+                    name = json.loads(row.picture.history[-1].operation)["layer"]
+                    print(f"pxi-edit: one point moves all of {name!r} and bends nothing; points "
+                          "with :0,0 stay", file=sys.stderr)  # fmt: skip
     return row.picture
 
 

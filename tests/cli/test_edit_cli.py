@@ -226,7 +226,7 @@ def test_a_drag_says_what_it_does_where_one_might_not_expect_it(tool, work):
         (("-9,0:1,1", two[1]), ("warning: drag: -9,0 outside of 'disc'",)),
         (("99,99:1,1",), ("99,99 outside", "one point moves all")),
     ):
-        ran = tool("edit", path, work / "out.pxi", "-f", "--drag", "disc", *handles)
+        ran = tool("edit", path, work / "out.pxi", "-f", "--drag", "2", *handles)
         lines = ran.err.splitlines()
         assert len(lines) == 1 + len(said)
         for phrase, line in zip(said, lines, strict=False):
