@@ -16,7 +16,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from proxyimg_codec.io.raster import encode_ppm
+from proxyimg_codec.io.png import encode_ppm
 
 from .common import Pixels, centre_crop, header, read_rgb
 

@@ -20,7 +20,7 @@ from proxyimg_codec.encoder.implicit import fit
 from proxyimg_codec.encoder.implicit.fit_problem import build
 from proxyimg_codec.encoder.implicit.state import State, rows_of
 from proxyimg_codec.encoder.settings import Settings
-from proxyimg_codec.encoder.shapes.masks import load_masks
+from proxyimg_codec.encoder.shapes.mask_files import load_masks
 from proxyimg_codec.io.psnr import psnr_8bit
 from proxyimg_codec.io.samples import to_float
 from proxyimg_codec.texture.network import NetShape, encode_features

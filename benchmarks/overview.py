@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmarks.common import Pixels, read_rgb
 from proxyimg_codec import encode
-from proxyimg_codec.encoder.shapes.masks import load_masks
+from proxyimg_codec.encoder.shapes.mask_files import load_masks
 from proxyimg_codec.io import raster
 
 PHOTO = Path(__file__).parents[1] / "docs" / "images" / "photo.png"

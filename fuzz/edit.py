@@ -69,7 +69,7 @@ class Source:
         schema = KINDS[kind]
         if kind == "layers":
             return [self.value("layer", names) for _ in range(1 + self.below(3))]
-        if kind in ("layer", "place"):
+        if kind in ("layer", "foreign", "place"):
             return (names[self.below(len(names))], self.below(8) - 4, "front", "back", "forward")[
                 max(self.below(8) - 3, 0)
             ]

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from .animate.motion import Motion
     from .encoder.encode import Progress
     from .encoder.settings import Settings
-    from .encoder.shapes.masks import Region
+    from .encoder.shapes.mask_arrays import Masks
 
 
 class Image(PictureHandle):
@@ -351,7 +351,7 @@ def encode(
     pixels: NDArray[Any],
     settings: Settings | None = None,
     *,
-    masks: Sequence[Region] | None = None,
+    masks: Masks | None = None,
     blocks: Mapping[str, bytes] | None = None,
     progress: Progress | None = None,
     **options: Any,
@@ -364,6 +364,9 @@ def encode(
             type is white, bool, or floating point in 0..1.
         settings: Settings of the encoder; by default ``Settings()``.
         masks: Layers given by the user, back to front; by default the encoder finds layers itself.
+            A list of arrays [H, W] (bool, 0 and 1, 0..255, or floats in 0..1, cut at one half) or
+            of regions, a dict of arrays by name, an array [N, H, W], or one array [H, W] of labels
+            0, 1, 2, ... of which 0 is the back.
         blocks: Metadata blocks to carry: ``icc`` and ``cicp``, which say what colours these are,
             ``exif`` and ``xmp``; `io.raster.read` gives those of a file.
         progress: Called with the name of a stage, and its numbers of units done and in all.
@@ -373,7 +376,7 @@ def encode(
         The picture as a reader will decode it.
 
     Raises:
-        InputError: The array cannot be a picture, or a mask does not fit it.
+        InputError: The array cannot be a picture, or a mask is none or does not fit it.
         UsageError: A setting is out of range.
         UnsupportedError: A package that is needed is not installed.
         LimitError: The picture is larger than readers accept by default.

@@ -135,10 +135,11 @@ def data_dir() -> Path:
 def tool(capsysbinary, monkeypatch):
     """Calls a tool in this process: tool("decode", "a.pxi", "-", code=0, stdin=b"") -> `Ran`.
 
-    Whatever happens there is no traceback, and an error is one line that starts with the program.
+    Whatever happens there is no traceback, and an error is one line that starts with the program;
+    `lines` of them if several inputs fail.
     """
 
-    def call(name: str, *args, code: int = 0, stdin: bytes = b"") -> Ran:
+    def call(name: str, *args, code: int = 0, stdin: bytes = b"", lines: int = 1) -> Ran:
         main = importlib.import_module(f"proxyimg_codec.cli.{name}").main
         monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(stdin)))
         capsysbinary.readouterr()
@@ -150,7 +151,7 @@ def tool(capsysbinary, monkeypatch):
         text = err.decode()
         assert got == code, text
         if code:
-            one_line(f"pxi-{name}", text)
+            one_line(f"pxi-{name}", text, lines)
         return Ran(got, out, text)
 
     return call

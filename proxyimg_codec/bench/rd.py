@@ -88,7 +88,8 @@ def find(folder: Path, chosen: str | None = None, masks: Path | None = None) -> 
     for place in (folder, masks):
         if place is not None and not place.is_dir():
             raise InputError(f"{place}: is not a folder")
-    files = sorted(p for p in folder.iterdir() if p.suffix.lower() in SUFFIXES and p.is_file())
+    seen = (p for p in folder.iterdir() if not p.name.startswith("."))
+    files = sorted(p for p in seen if p.suffix.lower() in SUFFIXES and p.is_file())
     if not files:
         raise InputError(f"{folder}: holds no pictures ({', '.join(SUFFIXES)})")
     names = [p.stem for p in files]
@@ -196,10 +197,14 @@ def measure(task: Task) -> Row | Failure:
     try:
         return _measure(source, codec, task)
     except PxiError as error:
-        return Failure(f"{where}: {error}")
+        return Failure(f"{where}: {_line(error)}")
     except Exception as error:
         # Foreign codecs raise errors of any class; the other measurements must not be lost.
-        return Failure(f"{where}: {type(error).__name__}: {error}")
+        return Failure(f"{where}: {type(error).__name__}: {_line(error)}")
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).splitlines())
 
 
 def _measure(source: Source, codec: Codec, task: Task) -> Row:
@@ -208,7 +213,7 @@ def _measure(source: Source, codec: Codec, task: Task) -> Row:
     pixels = _pixels(source.path)
     encode = codec.encode
     if codec.masks:
-        from ..encoder.shapes.masks import load_masks
+        from ..encoder.shapes.mask_files import load_masks
 
         encode = partial(encode, masks=load_masks(str(source.masks), source.width, source.height))
     _warm(codec)

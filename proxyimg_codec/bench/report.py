@@ -69,8 +69,8 @@ class Log:
             if task_key(t) in known
         ]
         self.open_tasks = [t for t in tasks if task_key(t) not in known]
-        write_atomically(path, to_csv(self.rows).encode())
-        self._file = path.open("a", encoding="utf-8")
+        write_atomically(path, to_csv(self.rows).encode(errors="backslashreplace"))
+        self._file = path.open("a", encoding="utf-8", errors="backslashreplace")
 
     def add(self, result: Row | Failure) -> None:
         """Adds the result of one task."""
@@ -90,7 +90,7 @@ class Log:
         """Closes the file, and sorts it by picture, codec and quality."""
         self._file.close()
         self.rows.sort(key=lambda r: (r.picture, r.codec, r.quality))
-        write_atomically(self.path, to_csv(self.rows).encode())
+        write_atomically(self.path, to_csv(self.rows).encode(errors="backslashreplace"))
 
     def reuse_note(self, name: str) -> str:
         """Text on the measurements reused from an older file, and on machines other than this."""

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 from ..animate.presets import PRESETS
 from ..errors import UsageError
-from .common import EXIT_CODES, Bar, add_limits, check_target, key, limits_of, parser, run
+from .common import EXIT_CODES, Bar, add_limits, key, limits_of, parser, printable, run
+from .places import check_target
 
 if TYPE_CHECKING:
     from ..animate.motion import Motion
@@ -59,7 +60,8 @@ def arguments() -> argparse.ArgumentParser:
     add("--sheet", action="store_true", help="OUT.png is a sprite sheet")
     add("--engine", choices=["auto", "numpy", "native", "ort"], default="auto",
         help="who runs the networks")  # fmt: skip
-    add("-j", "--jobs", type=int, default=2, metavar="N", help="threads; 2 by default")
+    add("-j", "--jobs", type=int, default=2, metavar="N", help="cores to use, by threads; 2 by "
+        "default")  # fmt: skip
     add_limits(p)
     add("-f", "--force", action="store_true", help="replace files that exist")
     add("--quiet", action="store_true", help="print nothing but errors")
@@ -93,7 +95,8 @@ def animate_file(args: argparse.Namespace) -> None:
         raise UsageError("the picture moves already; give another --preset or --motion")
     said = write_clip(image, args) if clip else write_picture(image, args)
     if not args.quiet:
-        print(f"{args.output}: {said}, {time.perf_counter() - started:.1f} s", file=sys.stderr)
+        seconds = time.perf_counter() - started
+        print(f"{printable(args.output)}: {said}, {seconds:.1f} s", file=sys.stderr)
 
 
 def check(args: argparse.Namespace, clip: bool) -> None:
@@ -120,13 +123,15 @@ def check(args: argparse.Namespace, clip: bool) -> None:
         for name in ("size", "background", "quality", "sheet"):
             if getattr(args, name) not in (None, False):
                 raise UsageError(f"--{name} makes no sense for a .pxi file")
-        check_target(args.output, args.force, args.input)
+        check_target(args.output, args.force, args.input, args.motion)
         return
     from ..export.clip_target import target_of
 
     target = target_of(args.output, args.sheet)
     if target.kind != "frames":
-        check_target(str(target.first), args.force, args.input)
+        check_target(str(target.path), args.force, args.input, args.motion)
+        if target.kind == "sheet":
+            check_target(str(target.sidecar), args.force, args.input, args.motion)
     elif target.first.exists() and not args.force:
         raise UsageError(f"{target.first}: exists already; use --force to replace the frames")
 

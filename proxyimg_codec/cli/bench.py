@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError, UsageError
-from .common import EXIT_CODES, Bar, parser, run
+from .common import EXIT_CODES, Bar, parser, printable, run
 
 if TYPE_CHECKING:
     from ..bench.peers import Codec
@@ -34,7 +34,7 @@ def arguments() -> argparse.ArgumentParser:
     add = rd.add_argument
     add("folder", metavar="FOLDER", nargs="?", help="folder of pictures")
     add("--dataset", metavar="FOLDER", help="the same, by name")
-    add("--out", metavar="DIR", default="rd", help="where the results go; default rd")
+    add("-o", "--out", metavar="DIR", default="rd", help="where the results go; default rd")
     add("--codecs", metavar="A,B", help="default jpeg,webp,jp2,jxl,avif420,avif444,pxi-fast,pxi; "
         "more are avif420-s0, pxi-masks, pxi-implicit")  # fmt: skip
     add("--speed0", action="store_true", help="also AVIF at speed 0, which is slow")
@@ -50,7 +50,8 @@ def arguments() -> argparse.ArgumentParser:
         "codec, settings, versions and quality")  # fmt: skip
     add("--published", action="store_true", help="draw the published curves of the Kodak pictures "
         "(as if FOLDER held kodim01 to kodim24)")  # fmt: skip
-    add("-j", "--jobs", type=int, metavar="N", help="processes; all cores by default")
+    add("-j", "--jobs", type=int, metavar="N", help="cores to use, by as many processes; all by "
+        "default")  # fmt: skip
     add("-f", "--force", action="store_true", help="replace the results in DIR")
     add("--quiet", action="store_true", help="print nothing but errors")
     return p
@@ -114,7 +115,8 @@ def rate_distortion(args: argparse.Namespace, command: str) -> None:
                 f"--reuse {log.path} goes on from there")  # fmt: skip
     if log.rows:
         published = args.published or report.is_kodak(sources)
-        say(report.write(out, log.rows, chosen, folder.resolve().name, rates, published))
+        name = printable(folder.resolve().name)
+        say(report.write(out, log.rows, chosen, name, rates, published))
     if log.failures:
         raise InputError(f"{len(log.failures)} of {len(tasks)} measurements failed, "
                          f"the first: {log.failures[0].message}")  # fmt: skip
@@ -133,11 +135,15 @@ def folder_of(args: argparse.Namespace) -> Path:
 
 
 def check_out(out: Path, args: argparse.Namespace) -> None:
-    """Refuses to replace earlier results, except those that --reuse continues.
+    """Refuses to replace pictures, and earlier results except those that --reuse continues.
 
     Raises:
+        UsageError: The folder is that of the pictures or masks.
         InputError: The folder holds other results, or cannot be made.
     """
+    for place in (args.folder, args.dataset, args.masks):
+        if place is not None and out.exists() and Path(place).exists() and out.samefile(place):
+            raise UsageError(f"--out {out}: the results need a folder of their own")
     path = out / "rd.csv"
     if path.exists() and not args.force:
         if args.reuse is None or not path.samefile(args.reuse):

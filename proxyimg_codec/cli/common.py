@@ -1,19 +1,19 @@
-"""Helpers of all tools: exit codes, limits, checks of output files, progress bars."""
+"""Helpers of all tools: exit codes, limits, messages, progress bars."""
 
 from __future__ import annotations
 
 import argparse
 import contextlib
 import io
+import logging
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import fields
-from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from .._version import __version__
-from ..errors import InputError, PxiError, UsageError
+from ..errors import PxiError, UsageError
 from ..limits import Limits
 from .signals import ending
 
@@ -23,9 +23,16 @@ EXIT_CODES = """exit codes:
 """
 
 
+class _Parser(argparse.ArgumentParser):
+    """Parser whose errors are safe for a terminal."""
+
+    def error(self, message: str) -> NoReturn:
+        super().error(printable(message))
+
+
 def parser(prog: str, description: str) -> argparse.ArgumentParser:
     """Creates an argument parser in the style of all tools."""
-    p = argparse.ArgumentParser(
+    p = _Parser(
         prog, description=description, epilog=EXIT_CODES,
         formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False,
     )  # fmt: skip
@@ -100,8 +107,28 @@ def run(prog: str, work: Callable[[], None]) -> int:
     _drop_output()
     if message:
         with contextlib.suppress(OSError):  # a terminal that was closed
-            print(f"{prog}: {' '.join(message.splitlines())}", file=sys.stderr)
+            print(f"{prog}: {printable(message.strip())}", file=sys.stderr)
     return code
+
+
+class _OneLine(logging.Formatter):
+    """Formatter that makes one line of a warning, safe for a terminal."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        return printable(super().format(record))
+
+
+@contextlib.contextmanager
+def warnings_shown(prog: str, quiet: bool = False) -> Iterator[None]:
+    """Prints what the package logs as warnings on stderr while it lasts, or nothing if `quiet`."""
+    log, handler = logging.getLogger("proxyimg_codec"), logging.StreamHandler()
+    handler.setFormatter(_OneLine(f"{prog}: warning: %(message)s"))
+    handler.setLevel(logging.CRITICAL if quiet else logging.WARNING)
+    log.addHandler(handler)
+    try:
+        yield
+    finally:
+        log.removeHandler(handler)
 
 
 def key(name: str) -> str | int:
@@ -111,8 +138,8 @@ def key(name: str) -> str | int:
 
 
 def printable(text: str) -> str:
-    """Makes text of a file safe for a terminal by escaping control characters."""
-    return text if text.isprintable() else ascii(text)
+    """Escapes what a terminal should not get: control characters, and bytes that are no UTF-8."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def _drop_output() -> None:
@@ -121,54 +148,6 @@ def _drop_output() -> None:
         print(end="", flush=True)
     except OSError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-
-
-def default_target(source: str, suffix: str) -> str:
-    """Name of the output file if the user gives none: the input with another suffix.
-
-    Args:
-        source: Name of the input, or ``-``.
-        suffix: Suffix of the output, with the dot.
-
-    Raises:
-        InputError: `source` is not the name of a file.
-    """
-    if source == "-":
-        return "-"
-    try:
-        return str(Path(source).with_suffix(suffix))
-    except ValueError:
-        raise InputError(f"{source!r} is not the name of a file") from None
-
-
-def check_target(path: str, force: bool, source: str | None = None) -> None:
-    """Refuses an output file that exists, is the input, or whose folder does not exist.
-
-    Pipes and devices may exist, because writing to them replaces nothing.
-
-    Args:
-        path: Name of the output, or ``-``.
-        force: Whether an existing file may be replaced.
-        source: Name of the input, or ``-``.
-
-    Raises:
-        UsageError: Input and output are the same file, or the output is a terminal.
-        InputError: The file exists and `force` is off, or its folder is missing.
-    """
-    if path == "-":
-        if sys.stdout is not None and sys.stdout.isatty():
-            raise UsageError("refusing to write binary data to a terminal; redirect it")
-        return
-    target = Path(path)
-    same = source not in (None, "-") and target.exists() and os.path.exists(str(source))
-    if same and target.samefile(str(source)):
-        raise UsageError(f"{path}: input and output are the same file")
-    if target.is_dir():
-        raise InputError(f"{path}: is a folder")
-    if not target.parent.is_dir():
-        raise InputError(f"{path}: its folder does not exist")
-    if target.is_file() and not force:
-        raise InputError(f"{path}: exists already; use --force to replace it")
 
 
 class Bar:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import logging
-import os
 import sys
 import time
 from collections.abc import Sequence
@@ -16,14 +14,13 @@ from .common import (
     EXIT_CODES,
     Bar,
     add_limits,
-    check_target,
-    default_target,
     key,
     limits_of,
     parser,
     printable,
-    run,
+    warnings_shown,
 )  # fmt: skip
+from .places import add_files, check_target, default_target, each, is_stream, parse, same_file
 
 LAYERED = (".ora", ".svg")
 """Suffixes of output files that hold layers instead of one flat picture."""
@@ -36,10 +33,9 @@ def arguments() -> argparse.ArgumentParser:
     """Parser of the command line."""
     p = parser("pxi-decode", "Render a .pxi file at any size and region.")
     p.epilog = f"{EXIT_CODES}  {DAMAGED} damaged, but decoded as far as it goes (--tolerant)\n"
-    p.add_argument("input", metavar="IN", help=".pxi file, or - for standard input")
-    p.add_argument("output", metavar="OUT", nargs="?", help="picture file, type by suffix; "
-                   ".ora writes the layers, .svg their outlines; - writes PNG to standard output; "
-                   "IN with the suffix .png by default")  # fmt: skip
+    add_files(p, ".pxi file, or - for standard input", "picture file, type by suffix; .ora writes "
+              "the layers, .svg their outlines; - writes PNG to standard output; IN with the "
+              "suffix .png by default")  # fmt: skip
     add = p.add_argument
     size = p.add_mutually_exclusive_group()
     size.add_argument("--scale", type=float, help="output pixels a canvas pixel")
@@ -71,20 +67,27 @@ def arguments() -> argparse.ArgumentParser:
 
 def main(argv: list[str] | None = None) -> int:
     """Entry point; returns the exit code."""
-    args = arguments().parse_args(argv)
+    args = parse(arguments(), argv)
     damage: list[str] = []
-    log, handler = logging.getLogger("proxyimg_codec"), logging.StreamHandler()
-    handler.setFormatter(logging.Formatter("pxi-decode: warning: %(message)s"))
-    log.addHandler(handler)
-    try:
-        code = run("pxi-decode", lambda: damage.extend(decode_file(args)))
-    finally:
-        log.removeHandler(handler)
+    with warnings_shown("pxi-decode"):
+        code = each("pxi-decode", args, ".png", check, lambda one: damage.extend(decode_file(one)))
     return code or (DAMAGED if damage else 0)
 
 
+def check(args: argparse.Namespace) -> None:
+    """Refuses what makes no sense for any input.
+
+    Raises:
+        UsageError: Flags need each other, or one file is to come from several inputs.
+    """
+    if args.graph is not None and args.export_onnx is None:
+        raise UsageError("--graph needs --export-onnx")
+    if args.export_onnx is not None and len(args.inputs) > 1:
+        raise UsageError("--export-onnx: of several pictures, export each by itself")
+
+
 def decode_file(args: argparse.Namespace) -> Sequence[str]:
-    """Runs pxi-decode with parsed arguments.
+    """Runs pxi-decode with parsed arguments for one input.
 
     Returns:
         Descriptions of the damage in the input; empty for a file that is intact.
@@ -93,18 +96,19 @@ def decode_file(args: argparse.Namespace) -> Sequence[str]:
         PxiError: Anything that goes wrong, as the class that decides the exit code.
     """
     rendering = args.output is not None or args.export_onnx is None
-    if args.graph is not None and args.export_onnx is None:
-        raise UsageError("--graph needs --export-onnx")
     output = target(args) if rendering else ""
     kind = Path(output).suffix.lower()
+    if kind == ".pxi":
+        raise UsageError(f"{output}: this draws pictures; pxi-edit writes .pxi files, and several "
+                         "inputs need -o FOLDER/")  # fmt: skip
     if rendering:
         refuse_for_layers(args, kind)
-        check_target(output, args.force, args.input)
+        check_target(output, args.force, *args.inputs)
     else:
         refuse_render_flags(args)
     if args.export_onnx is not None:
         check_target(args.export_onnx, args.force, args.input)
-        if rendering and os.path.realpath(output) == os.path.realpath(args.export_onnx):
+        if rendering and (output == args.export_onnx or same_file(output, args.export_onnx)):
             raise UsageError(f"{output}: the picture and the ONNX model need two files")
 
     from ..api import open_image
@@ -116,14 +120,20 @@ def decode_file(args: argparse.Namespace) -> Sequence[str]:
     if args.export_onnx is not None:
         export(image, args)
     if rendering:
-        if kind in LAYERED:
-            layered(image, output, kind, args)
-        else:
-            render(image, output, args)
+        draw(image, output, args)
         if not args.quiet:
-            print(f"{output}: {time.perf_counter() - started:.2f} s", file=sys.stderr)
+            print(f"{printable(output)}: {time.perf_counter() - started:.2f} s", file=sys.stderr)
     damage: Sequence[str] = image.damage
     return damage
+
+
+def draw(image: Any, output: str, args: argparse.Namespace) -> None:
+    """Draws an image to a file, whose suffix says whether it holds layers, outlines or pixels."""
+    kind = Path(output).suffix.lower()
+    if kind in LAYERED:
+        layered(image, output, kind, args)
+    else:
+        render(image, output, args)
 
 
 def refuse_render_flags(args: argparse.Namespace) -> None:
@@ -254,7 +264,8 @@ def render(image: Any, output: str, args: argparse.Namespace) -> None:
     if converted:
         pixels = rounded(to_srgb(pixels, blocks), dtype)
         blocks = {k: v for k, v in blocks.items() if k not in COLOUR}
-    notes = write(output, pixels, blocks, ".png" if output == "-" else None)
+    nameless = is_stream(output) and not Path(output).suffix
+    notes = write(output, pixels, blocks, ".png" if nameless else None)
     for note in () if args.quiet else notes:
         print(f"pxi-decode: warning: {printable(output)}: {note}", file=sys.stderr)
 

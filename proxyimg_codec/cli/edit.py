@@ -5,17 +5,26 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import re
+import os
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import UsageError
-from .common import add_limits, check_target, limits_of, parser, printable, run
-from .edit_flags import Values, add_edits
+from .common import add_limits, limits_of, parser, printable, run, warnings_shown
+from .edit_flags import Values, add_edits, guarded, unguarded
+from .places import (
+    add_force_suffix,
+    check_suffix,
+    check_target,
+    in_and_out,
+    is_stream,
+    parse,
+    same_file,
+)
 
 if TYPE_CHECKING:
     from ..model import Picture
@@ -26,15 +35,18 @@ def arguments() -> argparse.ArgumentParser:
     p = parser(
         "pxi-edit",
         "Edit the layers of a .pxi picture. Edits are repeatable and done in their order; "
-        "NAME is a layer's name, or its position from the back (all digits), or a group's name.",
+        "NAME is a layer's name, or its position from the back in IN (all digits), or a group's "
+        "name.",
     )
-    p.add_argument("input", metavar="IN", help=".pxi file, or - for standard input")
-    p.add_argument("output", metavar="OUT", nargs="?", help=".pxi file, - for standard output; "
-                   "may be IN with --force")  # fmt: skip
+    p.usage = "%(prog)s [options] IN [OUT]"
+    p.add_argument("files", metavar="IN [OUT]", nargs="*", default=[], help=".pxi file, or - for "
+                   "standard input; .pxi file, which may be IN with --force, - for standard "
+                   "output, or another picture file, to draw it as pxi-decode does")  # fmt: skip
     add_edits(p)
     p.add_argument("--bake", action="store_true", help="forget the history of edits")
     p.add_argument("--list", action="store_true", help="print layers, groups and history")
     add_limits(p)
+    add_force_suffix(p)
     p.add_argument("-f", "--force", action="store_true", help="replace OUT if it exists")
     p.add_argument("--quiet", action="store_true", help="print nothing but errors")
     p.add_argument("--json", action="store_true", help="print the list or report as JSON")
@@ -43,13 +55,10 @@ def arguments() -> argparse.ArgumentParser:
 
 def main(argv: list[str] | None = None) -> int:
     """Entry point; returns the exit code."""
-    words = sys.argv[1:] if argv is None else argv
-    return run("pxi-edit", lambda: edit_file(arguments().parse_intermixed_args(_guarded(words))))
-
-
-def _guarded(words: list[str]) -> list[str]:
-    """Puts a space before words such as -5,3, so that argparse does not take them for flags."""
-    return [f" {w}" if re.match(r"-\.?[0-9]", w) else w for w in words]
+    args = parse(arguments(), guarded(sys.argv[1:] if argv is None else argv))
+    args.files = unguarded(args.files)
+    with warnings_shown("pxi-edit", args.quiet):
+        return run("pxi-edit", lambda: edit_file(args))
 
 
 def edit_file(args: argparse.Namespace) -> None:
@@ -58,15 +67,16 @@ def edit_file(args: argparse.Namespace) -> None:
     Raises:
         PxiError: Anything that goes wrong, as the class that decides the exit code.
     """
-    _check(args)
+    args.input, args.output = in_and_out(args.files)
     operations = [edit.values() for edit in args.edits]
+    _check(args, operations)
 
     from ..codec.read import from_file
     from ..codec.write import to_bytes
     from ..io.files import write_atomically
 
     started = time.perf_counter()
-    picture = _edited(from_file(args.input, limits_of(args)), operations)
+    picture = _edited(from_file(args.input, limits_of(args)), operations, args.quiet)
     if args.bake:
         picture = replace(picture, history=())
     if args.list:
@@ -74,44 +84,82 @@ def edit_file(args: argparse.Namespace) -> None:
         print(json.dumps(facts, indent=2) if args.json else text(facts))
     if args.output is None:
         return
-    data = to_bytes(picture)
-    write_atomically(args.output, data)
-    _report(args, picture, len(data), time.perf_counter() - started)
+    if _drawn(args):
+        _draw(args, picture)
+        size = os.path.getsize(args.output)
+    else:
+        data = to_bytes(picture)
+        write_atomically(args.output, data)
+        size = len(data)
+    _report(args, picture, size, time.perf_counter() - started)
 
 
-def _check(args: argparse.Namespace) -> None:
+def _drawn(args: argparse.Namespace) -> bool:
+    """Whether the output is the edited picture as pixels, or as layers or outlines."""
+    named = args.output is not None and not is_stream(args.output) and not args.force_suffix
+    return named and Path(args.output).suffix.lower() not in ("", ".pxi")
+
+
+def _draw(args: argparse.Namespace, picture: Picture) -> None:
+    """Draws the edited picture as pxi-decode does."""
+    from ..api import Image
+    from . import decode
+
+    flags = decode.arguments().parse_args([f"--limit={v}" for v in args.limit])
+    flags.quiet = args.quiet
+    decode.draw(Image(picture), args.output, flags)
+
+
+def _check(args: argparse.Namespace, operations: Sequence[Values]) -> None:
     """Refuses contradictory arguments before any work is done.
 
     Raises:
-        UsageError: OUT is missing, or standard output is needed twice.
+        UsageError: OUT is missing, is another input, or has a doubtful suffix, or standard output
+            is needed twice.
         InputError: OUT exists and --force is not given, or it cannot be written.
     """
     if args.output is None and (args.edits or args.bake or not args.list):
         raise UsageError("OUT is missing; --list alone needs none")
     if args.output == "-" and (args.list or args.json):
         raise UsageError("a list or report and a picture cannot both go to standard output")
-    if args.output is not None:
-        same = Path(args.output) == Path(args.input)
-        check_target(args.output, args.force, None if same and args.force else args.input)
+    if args.output is None:
+        return
+    drawn = _drawn(args)
+    if not drawn:
+        check_suffix(args.output, args.force_suffix, "name it so, or .png to draw it")
+    place = args.force and not drawn and args.output != "-"
+    in_place = place and same_file(args.output, args.input)
+    others = [None if in_place else args.input, *_files_of(args, operations)]
+    check_target(args.output, args.force, *others)
 
 
-def _edited(picture: Picture, operations: Sequence[Values]) -> Picture:
-    """Applies all operations to a picture.
+def _files_of(args: argparse.Namespace, operations: Sequence[Values]) -> list[str]:
+    """Files that edits read: scripts, and the sources of textures and outlines."""
+    edits = [edit for values in operations for edit in values.get("script", [values])]
+    sources = [edit.get("source") for edit in edits if isinstance(edit, Mapping)]
+    scripts = [edit.words[0] for edit in args.edits if edit.flag == "--script"]
+    return [*scripts, *(v for v in sources if isinstance(v, str) and "\0" not in v)]
+
+
+def _edited(picture: Picture, operations: Sequence[Values], quiet: bool) -> Picture:
+    """Applies all operations to a picture, and says what a drag of a single point does.
 
     Error messages count the operations from 1; each operation of a script counts by itself.
     """
-    from ..edit.history import undone
-    from ..edit.script import apply
+    from ..edit.script import Row
 
-    number = 1
+    row = Row(picture)
     for values in operations:
         if "undo" in values:
-            picture = undone(picture, values["undo"])
-            continue
-        edits = values.get("script", [values])
-        picture = apply(picture, edits, number)
-        number += len(edits)
-    return picture
+            row.undo(values["undo"])
+        else:
+            for edit in values.get("script", [values]):
+                row.apply(edit)
+                if edit["op"] == "drag" and len(edit["handles"]) == 1 and not quiet:
+                    name = json.loads(row.picture.history[-1].operation)["layer"]
+                    print(f"pxi-edit: one point moves all of {name!r} and bends nothing; points "
+                          "with :0,0 stay", file=sys.stderr)  # fmt: skip
+    return row.picture
 
 
 def _report(args: argparse.Namespace, picture: Picture, size: int, seconds: float) -> None:
@@ -127,7 +175,7 @@ def _report(args: argparse.Namespace, picture: Picture, size: int, seconds: floa
         print(json.dumps(report))
     elif not args.quiet:
         print(
-            f"{args.output}: {size} bytes, {len(picture.layers)} layers, "
+            f"{printable(args.output)}: {size} bytes, {len(picture.layers)} layers, "
             f"{len(picture.history)} edits to undo, {round(seconds, 3):.2f} s",
             file=sys.stderr,
         )

@@ -14,6 +14,10 @@ Values = dict[str, Any]
 """An edit operation, ``{"script": operations}`` or ``{"undo": count}``."""
 
 
+_GUARD = "\0"
+"""Mark before words that are no flags; no word of a command line has this character."""
+
+
 class Edit(NamedTuple):
     """Edit on the command line.
 
@@ -34,7 +38,7 @@ class Edit(NamedTuple):
             UsageError: The words cannot be understood.
         """
         try:
-            return self.parse(*(w.strip() if w.startswith(" -") else w for w in self.words))
+            return self.parse(*self.words)
         except (ValueError, TypeError):
             said = f"{self.flag} {' '.join(self.words)}"
             raise UsageError(f"{said}: cannot be understood; see --help") from None
@@ -63,7 +67,7 @@ class Flag(NamedTuple):
 
         class Gather(argparse.Action):
             def __call__(self, parser: Any, space: Any, values: Any, option: Any = None) -> None:
-                space.edits = [*space.edits, Edit(flag, parse, list(values))]
+                space.edits = [*space.edits, Edit(flag, parse, unguarded(values))]
 
         edits.add_argument(
             flag,
@@ -81,6 +85,16 @@ def add_edits(p: argparse.ArgumentParser) -> None:
     group = p.add_argument_group("edits")
     for flag in FLAGS:
         flag.add(group)
+
+
+def guarded(words: Sequence[str]) -> list[str]:
+    """Marks words such as -5,3, so that argparse does not take them for flags."""
+    return [_GUARD + word if re.match(r"-\.?[0-9]", word) else word for word in words]
+
+
+def unguarded(words: Sequence[str]) -> list[str]:
+    """Takes the marks of `guarded` away."""
+    return [word.removeprefix(_GUARD) for word in words]
 
 
 def _floats(text: str, count: int) -> list[float]:
@@ -127,7 +141,7 @@ def _drag(layer: str, *handles: str) -> Values:
         raise ValueError
     moves = []
     for handle in handles:
-        place, _, by = handle.strip().partition(":")
+        place, _, by = handle.partition(":")
         moves.append([*_floats(place, 2), *_floats(by, 2)])
     return {"op": "drag", "layer": key(layer), "handles": moves}
 
@@ -144,12 +158,20 @@ def _named(op: str) -> Callable[[str], Values]:
     return lambda layer: {"op": op, "layer": key(layer)}
 
 
-def _assigned(op: str, name: str) -> Callable[[str], Values]:
-    """Function that parses NAME=VALUE, or NAME alone, for operation `op` with parameter `name`."""
+def _assigned(
+    op: str, name: str, kind: Callable[[str], str | int] = str
+) -> Callable[[str], Values]:
+    """Function that parses NAME=VALUE, or NAME alone, for operation `op`.
+
+    Args:
+        op: The operation.
+        name: Its parameter that gets the value.
+        kind: Function that parses the value.
+    """
 
     def parse(text: str) -> Values:
         layer, given, value = text.rpartition("=") if "=" in text else (text, "", "")
-        return {"op": op, "layer": key(layer), **({name: value} if given else {})}
+        return {"op": op, "layer": key(layer), **({name: kind(value)} if given else {})}
 
     return parse
 
@@ -167,7 +189,7 @@ def _texture(text: str) -> Values:
         source, values["fit"] = source.removesuffix("@shape"), "shape"
     if parts := re.fullmatch(r"(.+?\.pxi):(.+)", source, re.IGNORECASE):
         return {**values, "source": parts[1], "from_layer": key(parts[2])}
-    return {**values, "source": source}
+    return {**values, "source": key(source)}
 
 
 def _recolour(layer: str, changes: str) -> Values:
@@ -221,7 +243,8 @@ FLAGS = (
         "x' = A x + C y + E, y' = B x + D y + F"),
     Flag("--flip", _flip, ["NAME", "AXIS"], "mirror: horizontal or vertical"),
     Flag("--drag", _drag, ["NAME", "X,Y:DX,DY ..."],
-        "bend: points of the layer and where they go; 0,0 pins a point"),
+        "bend: points of the layer and where they go; 0,0 pins a point; one point alone moves all, "
+        "one outside takes the nearest point along"),
     Flag("--point", _point, ["NAME", "PATH,POINT", "DX,DY"], "move a boundary's control point"),
     Flag("--outlines", _outlines, ["FILE.svg"], "take boundaries from an SVG, by layer name"),
     Flag("--remove", _named("remove"), ["NAME"], "take away: what it hid shows"),
@@ -240,7 +263,8 @@ FLAGS = (
         "hue:DEG, saturation:F, brightness:F, #rrggbb (shades of a colour); several with commas"),
     Flag("--group", _group, ["NAME=A,B,..."], "put layers into a group"),
     Flag("--ungroup", _ungroup, ["NAME"], "dissolve a group"),
-    Flag("--parent", _assigned("parent", "to"), ["NAME=PARENT"], "let a layer follow another one"),
+    Flag("--parent", _assigned("parent", "to", key), ["NAME=PARENT"],
+        "let a layer follow another one"),
     Flag("--script", _script, ["FILE"], "edits from a JSON file"),
     Flag("--undo", _undo, ["N"], "take back the last N edits"),
 )  # fmt: skip

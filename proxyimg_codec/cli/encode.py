@@ -11,7 +11,16 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
-from .common import Bar, check_target, default_target, parser, printable, run
+from .common import Bar, parser, printable, warnings_shown
+from .places import (
+    add_files,
+    add_force_suffix,
+    check_suffix,
+    check_target,
+    default_target,
+    each,
+    parse,
+)
 
 PRESET_NAMES = ("fast", "default", "best", "paper")
 
@@ -21,18 +30,22 @@ def arguments() -> argparse.ArgumentParser:
     p = parser(
         "pxi-encode", "Encode a picture as .pxi: layers, Bezier boundaries, fitted textures."
     )
-    p.add_argument("input", metavar="IN", help="picture file, .ora file whose layers become "
-                   "those of OUT, or - for standard input")  # fmt: skip
-    p.add_argument("output", metavar="OUT", nargs="?", help=".pxi file, - for standard output; "
-                   "IN with the suffix .pxi by default")  # fmt: skip
+    add_files(
+        p,
+        "picture file, .ora file whose layers become those of OUT, or - for standard input",
+        ".pxi file, - for standard output; IN with the suffix .pxi by default",
+    )
     _add_aims(p)
     _add_decomposition(p)
     _add_details(p)
     _add_reading(p)
     p.add_argument("-f", "--force", action="store_true", help="replace OUT if it exists")
+    add_force_suffix(p)
     p.add_argument("--quiet", action="store_true", help="print nothing but errors")
     p.add_argument(
-        "--json", action="store_true", help="print the report as JSON on standard output"
+        "--json",
+        action="store_true",
+        help="print the report as JSON on standard output, a line for each picture",
     )
     return p
 
@@ -60,7 +73,12 @@ def _add_aims(p: argparse.ArgumentParser) -> None:
 def _add_decomposition(p: argparse.ArgumentParser) -> None:
     """Adds the flags that decide about layers, boundaries and meshes."""
     add = p.add_argument
-    add("--masks", metavar="PATH", help="folder of mask PNGs, or one label PNG: the layers to make")
+    add(
+        "--masks",
+        metavar="PATH",
+        help="the layers to make: a folder of masks, or one picture "
+        "of labels (palette or grey: 0 is the back, 1, 2, ... are objects)",
+    )
     add("--max-layers", type=int, metavar="N", help="most layers found; default 4")
     add("--layers", type=int, choices=[1], help="1: one layer, no decomposition")
     add("--segmenter", metavar="NAME", help="who finds layers; default regions, "
@@ -82,8 +100,8 @@ def _add_details(p: argparse.ArgumentParser) -> None:
     add("--net-bits", type=int, metavar="2-8", help="bits a network weight; default 8; "
         "like --feature-bits for texture implicit")  # fmt: skip
     add("--seed", type=int, default=0, help="seed of everything random; default 0")
-    add("-j", "--jobs", type=int, metavar="N", help="threads, at most 4 of use; all cores by "
-        "default")  # fmt: skip
+    add("-j", "--jobs", type=int, metavar="N", help="cores to use, by threads, at most 4 of use "
+        "for one picture; all by default")  # fmt: skip
     add("--device", choices=["cpu", "cuda"], default="cpu", help="where to fit; default cpu")
 
 
@@ -100,12 +118,27 @@ def _add_reading(p: argparse.ArgumentParser) -> None:
 
 def main(argv: list[str] | None = None) -> int:
     """Entry point; returns the exit code."""
-    args = arguments().parse_args(argv)
-    return run("pxi-encode", lambda: encode_file(args))
+    args = parse(arguments(), argv)
+    with warnings_shown("pxi-encode", args.quiet):
+        return each("pxi-encode", args, ".pxi", check, encode_file)
+
+
+def check(args: argparse.Namespace) -> None:
+    """Refuses what makes no sense for any input.
+
+    Raises:
+        UsageError: A setting is out of range, flags contradict each other, or masks are given for
+            several pictures.
+    """
+    from ..errors import UsageError
+
+    if args.masks is not None and len(args.inputs) > 1:
+        raise UsageError("--masks: they belong to one picture; encode each by itself")
+    settings_from(args)
 
 
 def encode_file(args: argparse.Namespace) -> None:
-    """Runs pxi-encode with parsed arguments.
+    """Runs pxi-encode with parsed arguments for one input.
 
     Raises:
         PxiError: Anything that goes wrong, as the class that decides the exit code.
@@ -115,7 +148,8 @@ def encode_file(args: argparse.Namespace) -> None:
     output = target(args)
     if output == "-" and args.json:
         raise UsageError("--json and a picture cannot both go to standard output")
-    check_target(output, args.force, args.input)
+    check_suffix(output, args.force_suffix, "name it so, give several pictures a folder with -o")
+    check_target(output, args.force, *args.inputs, *mask_files(args.masks))
     settings = settings_from(args)
 
     from ..codec.read import from_bytes
@@ -151,7 +185,17 @@ def encode_file(args: argparse.Namespace) -> None:
     if args.json:
         print(json.dumps(report))
     elif not args.quiet:
-        print(describe(report), file=sys.stderr)
+        print(printable(describe(report)), file=sys.stderr)
+
+
+def mask_files(path: str | None) -> list[str]:
+    """Files that --masks names, as far as they can be listed."""
+    if path is None:
+        return []
+    try:
+        return [os.path.join(path, name) for name in os.listdir(path)]
+    except OSError:
+        return [path]
 
 
 def encoded(source: bytes, args: argparse.Namespace, settings: Any, bar: Bar) -> tuple[Any, Any]:
@@ -169,7 +213,7 @@ def encoded(source: bytes, args: argparse.Namespace, settings: Any, bar: Bar) ->
     from ..encoder.encode import encode
     from ..encoder.import_layers import composite, encode_layers
     from ..encoder.openraster import is_openraster, read_openraster
-    from ..encoder.shapes.masks import load_masks
+    from ..encoder.shapes.mask_files import load_masks
     from ..io.color import is_srgb
     from ..io.raster import parse, stripped
 

@@ -126,8 +126,8 @@ def _hue(degrees: float) -> Reals:
 
 
 @operation("texture", layer="layer: the layer that changes, by name or position",
-           source="text: a layer of this picture, or the name of a .pxi or picture file",
-           from_layer="layer?: a layer of that .pxi file; its front one by default",
+           source="layer: a layer of this picture, or the name of a .pxi or picture file",
+           from_layer="foreign?: a layer of that .pxi file; its front one by default",
            fit="fit?: box to box, or by the shape of the outlines")  # fmt: skip
 def texture(
     picture: Picture,
@@ -220,7 +220,7 @@ def _loaded(source: str, name: str | int | None) -> tuple[Picture, Layer]:
     try:
         with open(source, "rb") as file:
             known = file.read(4) == b"\x89PXI"
-    except (FileNotFoundError, UnicodeError):
+    except (FileNotFoundError, ValueError):
         raise UsageError(
             f"texture: {source!r} is neither a layer of the picture nor a file"
         ) from None

@@ -87,6 +87,19 @@ def drag(
     return _columns(_dragged(mesh, *map(_complex, (nodes, rest, points, targets))))
 
 
+def distances(nodes: Real, triangles: NDArray[np.int32], points: Real) -> Real:
+    """Distances of points from a mesh, float64 [H] in pixels; 0 inside.
+
+    Args:
+        nodes: float64 [N, 2] positions of the nodes in pixels.
+        triangles: int32 [T, 3] nodes of each triangle, at least one.
+        points: float64 [H, 2] points in pixels.
+    """
+    mesh, z, at = triangles.astype(np.int64), _complex(nodes), _complex(points)
+    holders, weights = _attach(z, mesh, at)
+    return np.asarray(np.abs(at - (weights * z[mesh[holders]]).sum(1)))
+
+
 def _dragged(mesh: Index, z: Complex, rest: Complex, points: Complex, targets: Complex) -> Complex:
     """Does the work of `drag` on complex numbers, one component after the other."""
     holders, weights = _attach(z, mesh, points)

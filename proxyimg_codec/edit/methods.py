@@ -63,6 +63,9 @@ class Editable(Generic[Edited]):
     def dragged(self, handles: Mapping[Pair, Pair]) -> Edited:
         """Bends the layer so that each point moves by its vector, as rigidly as possible elsewhere.
 
+        One point alone moves the whole layer. For a point outside the layer the nearest one inside
+        is taken, which is logged as a warning.
+
         Args:
             handles: Vectors dx, dy by canvas points x, y on the layer; (0, 0) pins a point.
 
@@ -152,16 +155,19 @@ class Editable(Generic[Edited]):
         values = {"hue": hue, "saturation": saturation, "brightness": brightness, "tint": tint}
         return self._edited("recolour", **values, matrix=None if matrix is None else list(matrix))
 
-    def textured(self, source: str, layer: str | int | None = None, fit: str = "box") -> Edited:
+    def textured(
+        self, source: str | int, layer: str | int | None = None, fit: str = "box"
+    ) -> Edited:
         """Gives the layer another texture; its shape stays.
 
         Args:
-            source: Name of a layer of this picture, or of a `.pxi` file or picture file.
+            source: Name or position of a layer of this picture, or name of a `.pxi` file or
+                picture file.
             layer: Name or position of a layer of that `.pxi` file; its front layer by default.
             fit: ``box`` stretches the texture from box to box; ``shape`` maps outline to outline.
         """
         return self._edited("texture", source=source, from_layer=layer, fit=fit)
 
-    def with_parent(self, name: str | None) -> Edited:
-        """Lets the layer follow another layer or a group; None for none."""
-        return self._edited("parent", to=name or "")
+    def with_parent(self, parent: str | int | None) -> Edited:
+        """Lets the layer follow another layer, by name or position, or a group; None for none."""
+        return self._edited("parent", to="" if parent is None else parent)

@@ -21,6 +21,7 @@ from ..io import json_schema
 from ..model import Layer, Layers, Picture
 from ..render.neighbours import settled
 from ..texture.network import Network
+from .positions import Positions
 
 NAME_MAX = 200
 
@@ -40,6 +41,7 @@ def _numbers(count: int) -> dict[str, Any]:
 
 KINDS: dict[str, dict[str, Any]] = {
     "layer": {"type": ["string", "integer"]},
+    "foreign": {"type": ["string", "integer"]},
     "layers": {"type": "array", "items": {"type": ["string", "integer"]}, "minItems": 1},
     "number": NUMBER,
     "integer": {"type": "integer"},
@@ -58,7 +60,8 @@ KINDS: dict[str, dict[str, Any]] = {
     "fit": {"enum": ["box", "shape"]},
     "colour": {"type": "string", "pattern": "^#[0-9a-fA-F]{6}$"},
 }
-"""JSON schema of each kind of parameter, by the name of the kind."""
+"""JSON schema of each kind of parameter, by the name of the kind. A `layer` is one of the picture,
+or a group; a `foreign` one is that of another file."""
 
 
 @dataclass(frozen=True)
@@ -113,12 +116,18 @@ def operation(name: str, /, **parameters: str) -> Callable[[Callable[..., Pictur
     return register
 
 
-def run(picture: Picture, values: Mapping[str, Any]) -> Picture:
-    """Applies one operation to a picture, and adds it to the history.
+def run(
+    picture: Picture, values: Mapping[str, Any], positions: Positions
+) -> tuple[Picture, Positions]:
+    """Applies one operation to a picture, and adds it to the history, with names for positions.
 
     Args:
         picture: The picture.
         values: The operation: its name under ``op``, and its parameters.
+        positions: What positions of layers mean.
+
+    Returns:
+        The picture after the operation, and what positions mean in the next one.
 
     Raises:
         UsageError: The operation is unknown, has wrong parameters, or cannot be done.
@@ -139,11 +148,18 @@ def run(picture: Picture, values: Mapping[str, Any]) -> Picture:
             raise UsageError(f"{name}: {key} is {shown}; it must be {parameter.meaning}")
         if key not in given and parameter.needed:
             raise UsageError(f"{name}: {key} is missing; it must be {parameter.meaning}")
+    for key, value in given.items():
+        if chosen.parameters[key].kind == "layer":
+            given[key] = positions.name(value)
+        elif chosen.parameters[key].kind == "layers":
+            given[key] = [positions.name(v) for v in value]
     result = chosen.apply(picture, **given)
-    text = json.dumps({"op": name, **given}, ensure_ascii=False)
+    edit = {"op": name, **given}
+    text = json.dumps(edit, ensure_ascii=False)
     # Names of files may have surrogates, which UTF-8 cannot encode; as escapes they are valid JSON.
     step = Step(text.encode(errors="backslashreplace").decode(), state(picture))
-    return replace(result, history=(*picture.history, step))
+    result = replace(result, history=(*picture.history, step))
+    return result, positions.after(edit, result)
 
 
 def _plain(value: Any) -> Any:

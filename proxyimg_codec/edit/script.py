@@ -12,30 +12,67 @@ from typing import Any
 from ..errors import PxiError, UsageError
 from ..model import Picture
 from . import appearance, structure, transforms
+from .history import undone
 from .operations import KINDS, OPERATIONS, run
+from .positions import Positions
 
-__all__ = ["OPERATIONS", "appearance", "apply", "parse", "schema", "structure", "transforms"]
+__all__ = ["OPERATIONS", "Row", "appearance", "apply", "parse", "schema", "structure", "transforms"]
 
 
-def apply(picture: Picture, operations: Iterable[Mapping[str, Any]], first: int = 1) -> Picture:
-    """Applies all `operations` to a picture, in order.
+class Row:
+    """A row of edits of one picture. Positions of layers are those before the first of them.
+
+    Args:
+        picture: The picture to edit.
+
+    Attributes:
+        picture: The picture after the edits so far.
+    """
+
+    def __init__(self, picture: Picture) -> None:
+        self.picture = picture
+        self._number = 0
+        self._positions = [Positions.of(picture)]
+
+    def apply(self, operation: Mapping[str, Any]) -> None:
+        """Applies an operation, as in a script.
+
+        Raises:
+            PxiError: It failed; the message begins with its number in the row. It is a `UsageError`
+                if the operation is unknown or cannot be done.
+        """
+        self._number += 1
+        try:
+            self.picture, positions = run(self.picture, operation, self._positions[-1])
+        except PxiError as error:
+            error.args = (f"edit {self._number}: {error}",)
+            raise
+        self._positions.append(positions)
+
+    def undo(self, steps: int) -> None:
+        """Takes back the last `steps` edits, also those before this row.
+
+        Raises:
+            PxiError: As `history.undone`.
+        """
+        self.picture = undone(self.picture, steps)
+        del self._positions[max(1, len(self._positions) - steps) :]
+
+
+def apply(picture: Picture, operations: Iterable[Mapping[str, Any]]) -> Picture:
+    """Applies all `operations` to a picture, in order, as a `Row`.
 
     Args:
         picture: The picture.
         operations: The operations, as in a script.
-        first: Number of the first operation in error messages.
 
     Raises:
-        PxiError: An operation failed; the message begins with its number. It is a `UsageError` if
-            the operation is unknown or cannot be done.
+        PxiError: As `Row.apply`.
     """
-    for number, values in enumerate(operations, first):
-        try:
-            picture = run(picture, values)
-        except PxiError as error:
-            error.args = (f"edit {number}: {error}",)
-            raise
-    return picture
+    row = Row(picture)
+    for operation in operations:
+        row.apply(operation)
+    return row.picture
 
 
 def parse(text: str, where: str) -> list[Mapping[str, Any]]:

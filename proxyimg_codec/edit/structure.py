@@ -135,7 +135,7 @@ def ungroup(picture: Picture, name: str) -> Picture:
     return _without(picture, list(picture.layers), {name})
 
 
-@operation("parent", layer=TARGET, to="text: a layer or group that it follows; empty for none")
+@operation("parent", layer=TARGET, to="layer: a layer or group that it follows; empty for none")
 def parent(picture: Picture, layer: str | int, to: str) -> Picture:
     """Lets a layer or group follow another one."""
     if to and to not in parents(picture):

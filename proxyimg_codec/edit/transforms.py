@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -22,6 +23,9 @@ from .operations import layer_named, members, operation, substituted
 
 REST_UNIT = 6
 """Unit of boundaries that are mapped from the present place of a layer back to rest."""
+
+BESIDE = 1.0
+"""Distance from a mesh in pixels up to which a point counts as on its layer."""
 
 Pair = Sequence[float]
 _SCALE = 1 << FRACTION_BITS
@@ -169,7 +173,11 @@ def meshed(picture: Picture, layer: Layer) -> Layer:
     handles="handles: a list of 1 to 500 x, y, dx, dy: points of the layer and where they go",
 )
 def drag(picture: Picture, layer: str | int, handles: Sequence[Sequence[float]]) -> Picture:
-    """Bends a layer so that points of it move; a point with 0, 0 stays."""
+    """Bends a layer so that points of it move; a point with 0, 0 stays.
+
+    One point alone moves the whole layer. A point outside the layer takes the nearest one inside
+    along, which is logged as a warning.
+    """
     chosen = meshed(picture, layer_named(picture, layer))
     assert chosen.mesh is not None, "`meshed` gives it one"
     refined, pose = chosen.mesh.refined, chosen.pose
@@ -177,7 +185,22 @@ def drag(picture: Picture, layer: str | int, handles: Sequence[Sequence[float]])
     present = pose.present(refined) / _SCALE
     rest = pose.apply(refined.nodes) / _SCALE
     moved = deform.drag(present, refined.faces, values[:, :2], values[:, :2] + values[:, 2:], rest)
+    _warn_of_points_outside(chosen, values, deform.distances(present, refined.faces, values[:, :2]))
     return substituted(picture, [replace(chosen, pose=_bent(chosen, moved))])
+
+
+def _warn_of_points_outside(
+    layer: Layer, handles: NDArray[np.float64], distances: NDArray[np.float64]
+) -> None:
+    """Logs which of the handles [H, 4] of a drag are how many pixels [H] away from the layer."""
+    outside = np.flatnonzero(distances > BESIDE)
+    if len(outside):
+        x, y = handles[outside[0], :2]
+        more = f" and {len(outside) - 1} more" if len(outside) > 1 else ""
+        logging.getLogger(__name__).warning(
+            "drag: %g,%g%s outside of %r, by %.3g pixels: its nearest point goes along",
+            x, y, more, layer.name, distances[outside[0]],
+        )  # fmt: skip
 
 
 def _bent(layer: Layer, present: NDArray[np.float64]) -> Pose:

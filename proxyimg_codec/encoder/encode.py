@@ -26,6 +26,7 @@ from .implicit.fit_problem import Problem, build
 from .implicit.state import State, quantize, rows_of
 from .settings import Settings
 from .shapes.layers import Plan, plan_layers
+from .shapes.mask_arrays import Masks, regions_of
 from .shapes.masks import Region
 from .shapes.meshes import with_meshes
 
@@ -50,7 +51,7 @@ def encode(
     pixels: NDArray[Any],
     settings: Settings | None = None,
     *,
-    masks: Sequence[Region] | None = None,
+    masks: Masks | None = None,
     blocks: Mapping[str, bytes] | None = None,
     progress: Progress | None = None,
     **options: Any,
@@ -63,6 +64,9 @@ def encode(
             type is white, bool, or floating point in 0..1.
         settings: Settings of the encoder; by default ``Settings()``.
         masks: Layers given by the user, back to front; by default the encoder finds layers itself.
+            A list of arrays [H, W] (bool, 0 and 1, 0..255, or floats in 0..1, cut at one half) or
+            of regions, a dict of arrays by name, an array [N, H, W], or one array [H, W] of labels
+            0, 1, 2, ... of which 0 is the back.
         blocks: Metadata blocks to carry: ``icc`` and ``cicp``, which say what colours these are,
             ``exif`` and ``xmp``; `io.raster.read` gives those of a file.
         progress: Called with the name of a stage, and its numbers of units done and in all.
@@ -83,7 +87,8 @@ def encode(
     picture, depth = to_float(np.asarray(pixels))
     DEFAULT_LIMITS.check("side", max(picture.shape[:2]))
     check_blocks(blocks or {})
-    plan = _planned(picture, settings, masks, report)
+    regions = None if masks is None else regions_of(masks, *picture.shape[:2])
+    plan = _planned(picture, settings, regions, report)
     premultiplied = picture.copy()
     premultiplied[..., :3] *= picture[..., 3:]
     plan = with_meshes(premultiplied, plan, settings)

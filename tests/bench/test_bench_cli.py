@@ -310,6 +310,24 @@ def test_results_are_not_replaced(tool, two, tmp_path, fake_codecs):
     tool("bench", *words, "--force")
 
 
+def test_results_do_not_go_among_the_pictures(tool, two, tmp_path, fake_codecs):
+    (tmp_path / "also").symlink_to(two)
+    for out in (two, tmp_path / "also"):
+        words = two, "-o", out, "--codecs", "plain", "-f"
+        assert "a folder of their own" in tool("bench", "rd", *words, code=2).err
+    assert sorted(p.name for p in two.iterdir()) == ["a.png", "b.png"]
+
+
+def test_odd_names_and_files_with_a_dot(tool, tmp_path, fake_codecs, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    folder = folder_of(tmp_path / "-p\udcff", **{"a\udcfe\n": picture(1)})
+    (folder / "._a.png").write_bytes(b"\0\5\x16\7 of a Mac")
+    ran = tool("bench", "rd", "--codecs", "plain", "-o", "out", "--", folder.name)
+    assert "1 pictures" in ran.out.decode()
+    assert len(read_csv(tmp_path / "out" / "rd.csv")) == len(fake_codecs)
+    assert (tmp_path / "out" / "psnr.png").exists()
+
+
 def test_qualities_of_the_table_are_ones_that_the_codecs_know():
     for codec in peers.codecs().values():
         assert [codec.checked(q) for q in codec.qualities] == list(codec.qualities)

@@ -20,10 +20,24 @@ def edited(tool, work, *words):
     return pxi.open(work / "out.pxi")
 
 
+def by_name(operation):
+    """The operation with names of the layers back, bar and disc for their positions."""
+
+    def name(value):
+        return ("back", "bar", "disc")[value] if isinstance(value, int) else value
+
+    plain = {k: name(v) if k in ("layer", "source") else v for k, v in operation.items()}
+    if operation["op"] == "parent":
+        plain["to"] = name(plain["to"])
+    if "layers" in plain:
+        plain["layers"] = [name(v) for v in plain["layers"]]
+    return plain
+
+
 @pytest.mark.parametrize(("words", "operation"), FLAGS)
 def test_flags_are_operations(tool, work, words, operation):
     got = edited(tool, work, *words)
-    assert json.loads(got.history[-1].operation) == operation
+    assert json.loads(got.history[-1].operation) == by_name(operation)
     want = pxi.open(work / "in.pxi").edited(operation)
     assert got.baked().to_bytes() == want.baked().to_bytes()
     assert got.undone().to_bytes() == (work / "in.pxi").read_bytes()
@@ -178,3 +192,45 @@ def test_decoding_shows_the_edit(tool, work):
     tool("decode", work / "out.pxi", work / "out.png")
     pixels = raster.read(work / "out.png").pixels
     assert pixels[24, 32, 0] < 180  # the disc is red
+
+
+def test_positions_are_those_of_the_input(tool, work):
+    words = "--remove", "1", "--rename", "2=sun", "--move", "2", "3,-4", "--duplicate", "0"
+    got = edited(tool, work, *words, "--hide", "-1")
+    assert [(v.name, v.pose.shift, v.pose.hidden) for v in got.layers] == [
+        ("back", (0, 0), False), ("back copy", (0, 0), False), ("sun", (3072, -4096), True)
+    ]  # fmt: skip
+    script = work / "edits.json"
+    edits = [{"op": "order", "layer": 2, "to": 1}, {"op": "hide", "layer": 2}]
+    script.write_text(json.dumps({"version": 1, "edits": edits}))
+    got = edited(tool, work, "--remove", "bar", "--script", script, "--opacity", "2", "0.5")
+    assert [v.pose.hidden for v in got.layers] == [False, True]
+    assert got.layers["disc"].pose.opacity < 40000
+    ran = tool("edit", work / "in.pxi", work / "b.pxi", "--remove", "1", "--hide", "1", code=2)
+    assert "edit 2: layer 1, which was 'bar', is gone" in ran.err
+
+
+def test_undo_among_edits_takes_positions_back(tool, work):
+    got = edited(tool, work, "--remove", "1", "--rename", "2=a", "--undo", "2", "--hide", "1")
+    assert [(v.name, v.pose.hidden) for v in got.layers] == [
+        ("back", False), ("bar", True), ("disc", False)
+    ]  # fmt: skip
+
+
+def test_a_drag_says_what_it_does_where_one_might_not_expect_it(tool, work):
+    path = work / "in.pxi"
+    two = ("30,20:1,1", "34,30:0,0")
+    for handles, said in (
+        (two, ()),
+        (two[:1], ("one point moves all of 'disc'",)),
+        (("-9,0:1,1", two[1]), ("warning: drag: -9,0 outside of 'disc'",)),
+        (("99,99:1,1",), ("99,99 outside", "one point moves all")),
+    ):
+        ran = tool("edit", path, work / "out.pxi", "-f", "--drag", "2", *handles)
+        lines = ran.err.splitlines()
+        assert len(lines) == 1 + len(said)
+        for phrase, line in zip(said, lines, strict=False):
+            assert line.startswith("pxi-edit: ")
+            assert phrase in line
+        quiet = tool("edit", path, work / "out.pxi", "-f", "--drag", "disc", *handles, "--quiet")
+        assert quiet.err == ""

@@ -225,6 +225,19 @@ def test_a_mask_hidden_by_another(tool, photo_png, tmp_path):
     assert '"a" is empty, hidden' in tool("encode", photo_png, "--masks", masks, code=3).err
 
 
+def test_soft_masks_are_cut_and_it_is_said(tool, photo_png, tmp_path):
+    soft = np.tile(np.linspace(0, 255, 48).astype(np.uint8), (40, 1))
+    (tmp_path / "masks").mkdir()
+    write(tmp_path / "masks" / "veil.png", np.repeat(soft[..., None], 3, 2))
+    words = "encode", photo_png, tmp_path / "a.pxi", "-f", *TINY, "--masks", tmp_path / "masks"
+    lines = tool(*words).err.splitlines()
+    assert len(lines) == 2
+    assert lines[0].startswith("pxi-encode: warning: soft masks are cut at one half")
+    assert "veil.png" in lines[0]
+    assert tool(*words, "--quiet").err == ""
+    assert not painted(pxi.open(tmp_path / "a.pxi"), "veil")[:, :20].any()
+
+
 def test_masks_that_are_not_there(tool, photo_png, tmp_path):
     (tmp_path / "empty").mkdir()
     for masks in (tmp_path / "missing.png", tmp_path / "empty", ""):
@@ -410,7 +423,7 @@ def test_unusable_outputs(tool, photo_png, tmp_path):
     tool("encode", photo_png, tmp_path / "missing" / "a.pxi", code=3)
     tool("encode", photo_png, tmp_path, "--force", code=3)
     tool("encode", photo_png, "", code=3)
-    tool("encode", photo_png, tmp_path / ("x" * 300), code=3)
+    tool("encode", photo_png, tmp_path / f"{'x' * 300}.pxi", code=3)
     tool("encode", photo_png, "-", "--json", code=2)
     assert photo_png.read_bytes() == before
     assert os.listdir(tmp_path) == ["photo.png"]

@@ -313,3 +313,12 @@ def test_bad_arguments_are_named(change, message):
     }
     with pytest.raises(UsageError, match=message):
         drag(**(good | change))
+
+
+def test_distances_from_a_mesh():
+    nodes, triangles = sheet(4, 3)
+    inside, corner = nodes[triangles].mean(1), nodes.min(0)
+    np.testing.assert_allclose(deform.distances(nodes, triangles, inside), 0, atol=1e-9)
+    points = corner + np.array([[-3, -4], [20, -7], [1, 1]])
+    found = deform.distances(nodes, triangles, points)
+    np.testing.assert_allclose(found, [5, 7, 0], atol=1e-9)

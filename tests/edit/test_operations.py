@@ -8,6 +8,7 @@ import pytest
 import proxyimg_codec as pxi
 from proxyimg_codec.container.chunks import Chunk
 from proxyimg_codec.edit.operations import OPERATIONS
+from proxyimg_codec.edit.transforms import bounds
 from proxyimg_codec.errors import UsageError
 from proxyimg_codec.io import raster
 from tests.support.edits import BAD, EDITS, covered, grown
@@ -306,3 +307,25 @@ def test_every_operation_is_tried_here():
         v["op"] for v, _ in BAD if isinstance(v, dict) and "op" in v
     }
     assert set(OPERATIONS) - {"show", "outlines", "still"} <= tried
+
+
+def test_a_drag_of_points_outside_takes_the_nearest_along_and_says_so(small_pxi, caplog):
+    layer = pxi.open(small_pxi).layers["disc"]
+    x0, y0, x1, y1 = bounds(layer.image.picture, [layer.data])
+    layer.dragged({((x0 + x1) / 2, y0 + 0.4): (2, 1), ((x0 + x1) / 2, y1 - 0.4): (0, 0)})
+    assert not caplog.records
+    far = (x1 + 9, (y0 + y1) / 2)
+    moved = layer.dragged({far: (4, 0), (x0 + 1, (y0 + y1) / 2): (0, 0), (0, 0): (1, 1)})
+    (record,) = caplog.records
+    said = record.getMessage()
+    assert f"{far[0]:g},{far[1]:g} and 1 more outside of 'disc', by " in said
+    right = bounds(moved.picture, [moved.layers["disc"].data])[2]
+    assert right == pytest.approx(x1 + 4, abs=1)
+
+
+def test_a_drag_of_one_point_moves_the_whole_layer(small_pxi, caplog):
+    image = pxi.open(small_pxi)
+    dragged = image.layers["disc"].dragged({(32, 20): (3, -2)})
+    before, after = (bounds(v.picture, [v.layers["disc"].data]) for v in (image, dragged))
+    np.testing.assert_allclose(np.subtract(after, before), [3, -2, 3, -2], atol=0.1)
+    assert not caplog.records

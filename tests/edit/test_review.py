@@ -189,7 +189,7 @@ def test_words_of_the_command_line(tool, small_pxi, tmp_path):
     out = tmp_path / "out.pxi"
     tool("edit", small_pxi, out, "--move", "disc", "-.5,-3")
     assert pxi.open(out).layers["disc"].pose.shift == (-512, -3072)
-    ran = tool("edit", small_pxi, tmp_path / "b", "--hide", "disc", "--hide", "cat", code=2)
+    ran = tool("edit", small_pxi, tmp_path / "b.pxi", "--hide", "disc", "--hide", "cat", code=2)
     assert "edit 2: there is no layer 'cat'" in ran.err
     tool("edit", small_pxi, out, "--rename", "bar=a:b é", "--force")
     assert "a:b é" in tool("edit", out, "--list").out.decode().splitlines()[-1]
@@ -207,5 +207,5 @@ def test_the_output_may_stand_after_the_edits(tool, small_pxi, tmp_path):
     tool("edit", small_pxi, out, out, "--hide", "bar", code=2)
     tool("edit", small_pxi, "--group", "both=bar,disc", tmp_path / "grouped.pxi")
     usage = " ".join(tool("edit", "--help").out.decode().split())
-    assert "[--group NAME=A,B,...]" in usage
-    assert "[--drag NAME [X,Y:DX,DY ...]]" in usage
+    assert "--group NAME=A,B,... put" in usage
+    assert "--drag NAME [X,Y:DX,DY ...] bend" in usage

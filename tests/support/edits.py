@@ -128,4 +128,6 @@ FLAGS = [
      {"op": "recolour", "layer": "disc", "hue": 40.0, "tint": "#102030"}),
     (["--group", "both=disc,1"], {"op": "group", "layers": ["disc", 1], "name": "both"}),
     (["--parent", "disc=bar"], {"op": "parent", "layer": "disc", "to": "bar"}),
+    (["--parent", "2=1"], {"op": "parent", "layer": 2, "to": 1}),
+    (["--texture", "-1=1@shape"], {"op": "texture", "layer": -1, "source": 1, "fit": "shape"}),
 ]  # fmt: skip

@@ -1,9 +1,7 @@
-"""Regions of a picture: masks given by the user, their stacking order, and their names."""
+"""Regions of a picture: masks with names, and their stacking order."""
 
-import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -11,8 +9,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 
-MAX_LABELS = 64
-_BACK_NAMES = ("back", "background")
+BACK_NAMES = ("back", "background")
 # Upper ends of the lightness of greys, and of the hue angle in Lab, in degrees.
 _GREYS = ((22, "black"), (40, "dark"), (70, "grey"), (88, "light"), (101, "white"))
 _HUES = ((10, "pink"), (47, "red"), (78, "orange"), (108, "yellow"), (165, "green"),
@@ -30,38 +27,6 @@ class Region:
 
     name: str
     mask: NDArray[np.bool_]
-
-
-def load_masks(path: str | Path, width: int, height: int) -> list[Region]:
-    """Reads the masks that a user made for a picture.
-
-    A folder of PNG files holds one binary mask in each. The natural order of the file names is back
-    to front, with `back` or `background` first. A region has the name of its file without a number
-    in front: `2 cat.png` is `cat`. Inside is where alpha is at least 128 if the file has
-    transparency; otherwise where luminance is at least 128, or not 0 in files that never reach 128.
-
-    A single PNG file holds labels: 0 for the back layer, then 1, 2, ... for objects back to front.
-    A grey value is its label; colours are labelled in the order of their packed values 0xRRGGBB.
-
-    Args:
-        path: Folder of masks, or file of labels.
-        width: Width of the picture in pixels.
-        height: Height of the picture in pixels.
-
-    Returns:
-        Regions back to front. They may overlap, and need not cover the picture: see `resolve`.
-
-    Raises:
-        InputError: There is no PNG file, or a file cannot be read, is no PNG, has the wrong size
-            or 16 bits per channel, or has more than `MAX_LABELS` labels.
-    """
-    path = Path(path)
-    if not path.is_dir():
-        return _label_regions(_read(path, width, height), path)
-    files = sorted((f for f in path.iterdir() if f.suffix.lower() == ".png"), key=_stack_order)
-    if not files:
-        raise InputError(f"{path}: the mask folder holds no PNG file; put one mask a layer in it")
-    return [Region(_name(f), _binary(_read(f, width, height))) for f in files]
 
 
 def resolve(
@@ -91,9 +56,9 @@ def resolve(
         InputError: A mask has the wrong size, or nothing of it remains visible.
     """
     for region in regions:
-        _check_size(f'mask "{region.name}"', region.mask, width, height)
+        check_size(f'mask "{region.name}"', region.mask, width, height)
     if support is not None:
-        _check_size("the support of the picture", support, width, height)
+        check_size("the support of the picture", support, width, height)
     free = np.ones((height, width), np.bool_) if support is None else support.copy()
     stack: list[Region] = []
     front_to_back = list(regions)[::-1]
@@ -173,73 +138,12 @@ def _colour_word(rgb: NDArray[np.float32]) -> str:
     return "brown" if word == "orange" and light < 50 else word
 
 
-def _name(file: Path) -> str:
-    """Name of a region: stem of its file without the number in front, at most 200 characters."""
-    stem = file.stem.encode("utf-8", "replace").decode()
-    return re.sub(r"^\d+[ ._-]+(?=.)", "", stem)[:200]
-
-
 def _is_back(region: Region) -> bool:
-    return region.name.lower() in _BACK_NAMES
+    return region.name.lower() in BACK_NAMES
 
 
-def _stack_order(file: Path) -> tuple[bool, list[tuple[int, str]], str]:
-    """Sort key for natural order: `object 2` before `object 10`, the background before all."""
-    parts = re.findall(r"\d+|\D+", file.stem.lower())
-    natural = [(int(p), "") if p.isdecimal() else (-1, p) for p in parts]
-    return file.stem.lower() not in _BACK_NAMES, natural, file.name
-
-
-def _read(path: Path, width: int, height: int) -> NDArray[np.uint8]:
-    """Reads a PNG file as uint8 [H, W], or [H, W, 3 or 4] with channels B, G, R, A."""
-    try:
-        data = np.frombuffer(path.read_bytes(), np.uint8)
-    except OSError as error:
-        raise InputError(f"{path}: cannot read the mask ({error.strerror}); check it") from error
-    is_png = data[:8].tobytes() == b"\x89PNG\r\n\x1a\n"
-    try:
-        image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if is_png else None
-    except cv2.error:
-        image = None
-    if image is None:
-        raise InputError(f"{path}: the mask is not a valid PNG file; save it as PNG")
-    if image.dtype != np.uint8:
-        raise InputError(f"{path}: the mask has 16 bits a channel; save it with 8 bits or fewer")
-    _check_size(f"{path}: the mask", image, width, height)
-    return np.asarray(image, np.uint8)
-
-
-def _check_size(what: str, mask: NDArray[np.generic], width: int, height: int) -> None:
+def check_size(what: str, mask: NDArray[np.generic], width: int, height: int) -> None:
+    """Raises `InputError` if a mask [H, W] has not the size of the picture."""
     if mask.shape[:2] != (height, width):
         found = f"{mask.shape[1]}x{mask.shape[0]}"
         raise InputError(f"{what} is {found}, the picture {width}x{height}; make them equal")
-
-
-def _binary(image: NDArray[np.uint8]) -> NDArray[np.bool_]:
-    """Decides by alpha, or by luminance if the file has no transparency, what is inside."""
-    if image.ndim == 3 and image.shape[2] == 4 and image[..., 3].min() < 255:
-        return np.asarray(image[..., 3] >= 128)
-    if image.ndim == 3:
-        image = np.asarray(cv2.cvtColor(image[..., :3], cv2.COLOR_BGR2GRAY), np.uint8)
-    # Some programs save masks as 0 and 1.
-    return image >= (128 if image.max() >= 128 else 1)
-
-
-def _label_regions(image: NDArray[np.uint8], path: Path) -> list[Region]:
-    if image.ndim == 3:
-        blue, green, red = (image[..., c].astype(np.int32) for c in range(3))
-        grey = bool(((blue == green) & (green == red)).all())
-        image_labels = blue if grey else red << 16 | green << 8 | blue
-    else:
-        grey, image_labels = True, image.astype(np.int32)
-    values = np.unique(image_labels)
-    if len(values) > MAX_LABELS:
-        raise InputError(
-            f"{path}: the label picture has {len(values)} different labels, more than "
-            f"{MAX_LABELS}; save it without smoothing, one flat colour a layer"
-        )
-    labels = values if grey else np.arange(len(values))
-    return [
-        Region("back" if label == 0 else f"object {label}", image_labels == value)
-        for label, value in zip(labels, values, strict=True)
-    ]

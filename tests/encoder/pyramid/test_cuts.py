@@ -6,7 +6,8 @@ import pytest
 from proxyimg_codec import encode, from_bytes
 from proxyimg_codec.container.file import parse
 from proxyimg_codec.encoder.pyramid.picture import _view
-from proxyimg_codec.encoder.shapes.masks import Region, load_masks
+from proxyimg_codec.encoder.shapes.mask_files import load_masks
+from proxyimg_codec.encoder.shapes.masks import Region
 from proxyimg_codec.geometry.boundary import Boundary
 from proxyimg_codec.io import raster
 from tests.support.edits import grown

@@ -1,8 +1,5 @@
-"""Reading user masks and making a valid layer stack of them."""
+"""A valid stack of layers made of masks."""
 
-from pathlib import Path
-
-import cv2
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,10 +7,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from proxyimg_codec.encoder.shapes.masks import (
-    MAX_LABELS,
     Region,
     description,
-    load_masks,
     nearness,
     resolve,
     unique_names,
@@ -27,92 +22,7 @@ def box(top: int, left: int, bottom: int, right: int, height: int = 6, width: in
     return mask
 
 
-def save(path: Path, image: np.ndarray) -> Path:
-    assert cv2.imwrite(str(path), image)
-    return path
-
-
-def test_folder_is_read_in_natural_order_with_the_background_first(tmp_path):
-    for i, name in enumerate(["object 10", "object 2", "Background"]):
-        save(tmp_path / f"{name}.png", box(i, 0, i + 1, 8) * np.uint8(255))
-    (tmp_path / "notes.txt").write_text("not a mask")
-    regions = load_masks(tmp_path, 8, 6)
-    assert [r.name for r in regions] == ["Background", "object 2", "object 10"]
-    assert [int(np.flatnonzero(r.mask.any(1))[0]) for r in regions] == [2, 1, 0]
-
-
-def test_what_counts_as_inside(tmp_path):
-    inside = box(1, 1, 3, 4)
-    grey = np.where(inside, 128, 127).astype(np.uint8)
-    save(tmp_path / "a grey.png", grey)
-    save(tmp_path / "b ones.png", inside.astype(np.uint8))
-    save(tmp_path / "c colour.png", np.where(inside[..., None], (0, 255, 255), 20).astype(np.uint8))
-    alpha = np.full((6, 8, 4), 255, np.uint8)
-    alpha[..., 3] = np.where(inside, 200, 100)
-    save(tmp_path / "d alpha.png", alpha)
-    opaque = np.dstack([grey] * 3 + [np.full_like(grey, 255)])
-    save(tmp_path / "e opaque alpha.png", opaque)
-    for region in load_masks(tmp_path, 8, 6):
-        np.testing.assert_array_equal(region.mask, inside, err_msg=region.name)
-
-
-def test_grey_label_picture(tmp_path):
-    labels = np.zeros((6, 8), np.uint8)
-    labels[2:, :3], labels[:2, 5:] = 3, 1
-    regions = load_masks(save(tmp_path / "labels.png", labels), 8, 6)
-    assert [r.name for r in regions] == ["back", "object 1", "object 3"]
-    for region, label in zip(regions, (0, 1, 3), strict=True):
-        np.testing.assert_array_equal(region.mask, labels == label)
-
-
-def test_colour_label_picture_is_ordered_by_packed_rgb(tmp_path):
-    image = np.zeros((6, 8, 3), np.uint8)
-    image[:, 2:5] = (0, 0, 255)  # red in BGR: 0xFF0000
-    image[:, 5:] = (255, 0, 0)  # blue: 0x0000FF
-    regions = load_masks(save(tmp_path / "labels.png", image), 8, 6)
-    assert [r.name for r in regions] == ["back", "object 1", "object 2"]
-    np.testing.assert_array_equal(regions[1].mask, box(0, 5, 6, 8))
-    np.testing.assert_array_equal(regions[2].mask, box(0, 2, 6, 5))
-
-
-def test_grey_labels_saved_as_colour_keep_their_value(tmp_path):
-    image = np.zeros((6, 8, 3), np.uint8)
-    image[3:] = 7
-    regions = load_masks(save(tmp_path / "labels.png", image), 8, 6)
-    assert [r.name for r in regions] == ["back", "object 7"]
-
-
-@pytest.mark.parametrize("count", [MAX_LABELS, MAX_LABELS + 1])
-def test_number_of_labels_is_limited(tmp_path, count):
-    image = np.arange(70, dtype=np.uint8).clip(0, count - 1).reshape(7, 10)
-    path = save(tmp_path / "labels.png", image)
-    if count <= MAX_LABELS:
-        assert len(load_masks(path, 10, 7)) == count
-    else:
-        with pytest.raises(InputError, match=f"labels.png.*{count} different labels"):
-            load_masks(path, 10, 7)
-
-
-def test_unusable_paths_are_refused_by_name(tmp_path):
-    with pytest.raises(InputError, match="holds no PNG"):
-        load_masks(tmp_path, 8, 6)
-    with pytest.raises(InputError, match=r"missing.png: cannot read"):
-        load_masks(tmp_path / "missing.png", 8, 6)
-    (tmp_path / "text.png").write_text("hello")
-    with pytest.raises(InputError, match=r"text.png: the mask is not a valid PNG"):
-        load_masks(tmp_path, 8, 6)
-    (tmp_path / "text.png").write_bytes(b"\x89PNG\r\n\x1a\n broken")
-    with pytest.raises(InputError, match=r"text.png: the mask is not a valid PNG"):
-        load_masks(tmp_path, 8, 6)
-    save(tmp_path / "text.png", np.zeros((6, 8), np.uint16))
-    with pytest.raises(InputError, match="16 bits"):
-        load_masks(tmp_path, 8, 6)
-
-
-def test_wrong_sizes_are_refused_with_both_sizes(tmp_path):
-    save(tmp_path / "cat.png", np.zeros((5, 9), np.uint8))
-    with pytest.raises(InputError, match=r"cat.png.*9x5.*8x6"):
-        load_masks(tmp_path, 8, 6)
+def test_wrong_sizes_are_refused_with_both_sizes():
     with pytest.raises(InputError, match=r'"cat".*9x5.*8x6'):
         resolve([Region("cat", np.ones((5, 9), np.bool_))], 6, 8)
 
@@ -178,13 +88,6 @@ def test_a_stack_is_a_partition(masks, support):
     np.testing.assert_array_equal(counts, 1 if support is None else support.astype(int))
     assert all(r.mask.any() for r in stack)
     assert len({r.name for r in stack}) == len(stack)
-
-
-def test_numbers_that_order_files_are_no_part_of_names(tmp_path):
-    for name in ("2 cat", "10_dog", "1-sky", "7", "3 "):
-        save(tmp_path / f"{name}.png", box(0, 0, 4, 8) * np.uint8(255))
-    names = [r.name for r in load_masks(tmp_path, 8, 6)]
-    assert names == ["sky", "cat", "3 ", "7", "dog"]
 
 
 def test_names_are_numbered_without_taking_given_ones():
