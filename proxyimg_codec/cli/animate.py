@@ -58,7 +58,7 @@ def arguments() -> argparse.ArgumentParser:
     add("--quality", type=int, metavar="0-100", help="of .mp4, .webm and .webp; 90 by default")
     add("--sheet", action="store_true", help="OUT.png is a sprite sheet")
     add("--engine", choices=["auto", "numpy", "native", "ort"], default="auto",
-        help="who runs the networks")  # fmt: skip
+        help="who draws, as for pxi-decode")  # fmt: skip
     add("-j", "--jobs", type=int, default=2, metavar="N", help="threads; 2 by default")
     add_limits(p)
     add("-f", "--force", action="store_true", help="replace files that exist")
@@ -82,16 +82,18 @@ def animate_file(args: argparse.Namespace) -> None:
     check(args, clip)
 
     from ..api import open_image
+    from ..native import kernel
 
     started = time.perf_counter()
-    image = open_image(args.input, limits_of(args))
-    if args.preset or args.motion:
-        image = moving(image, args)
-    elif image.timeline is None:
-        raise UsageError(f"{args.input} does not move by itself; give --preset or --motion")
-    elif not clip:
-        raise UsageError("the picture moves already; give another --preset or --motion")
-    said = write_clip(image, args) if clip else write_picture(image, args)
+    with kernel.for_engine(args.engine):
+        image = open_image(args.input, limits_of(args))
+        if args.preset or args.motion:
+            image = moving(image, args)
+        elif image.timeline is None:
+            raise UsageError(f"{args.input} does not move by itself; give --preset or --motion")
+        elif not clip:
+            raise UsageError("the picture moves already; give another --preset or --motion")
+        said = write_clip(image, args) if clip else write_picture(image, args)
     if not args.quiet:
         print(f"{args.output}: {said}, {time.perf_counter() - started:.1f} s", file=sys.stderr)
 

@@ -53,7 +53,7 @@ def arguments() -> argparse.ArgumentParser:
     add("--bit-depth", type=int, choices=[8, 16, 32], help="bits a sample, 32 = floating point; "
         "8 by default")  # fmt: skip
     add("--engine", choices=["auto", "numpy", "native", "ort"], default="auto",
-        help="who runs the networks; auto is the fastest that is built in")  # fmt: skip
+        help="who decodes; auto is the fastest that is built in, numpy is numpy alone")  # fmt: skip
     add("--tolerant", action="store_true", help="of a file that is cut off or damaged, make the "
         "picture from the levels that can be decoded, say so, and exit with 7")  # fmt: skip
     add("--export-onnx", metavar="FILE", help="write the decoder network as ONNX; of a pyramid "
@@ -105,20 +105,21 @@ def decode_file(args: argparse.Namespace) -> Sequence[str]:
             raise UsageError(f"{output}: the picture and the ONNX model need two files")
 
     from ..api import open_image
+    from ..native import kernel
 
     started = time.perf_counter()
-    image = open_image(args.input, limits_of(args), tolerant=args.tolerant)
-    if args.time is not None:
-        image = image.at(args.time)
-    if args.export_onnx is not None:
-        export(image, args)
-    if rendering:
+    with kernel.for_engine(args.engine):
+        image = open_image(args.input, limits_of(args), tolerant=args.tolerant)
+        if args.time is not None:
+            image = image.at(args.time)
+        if args.export_onnx is not None:
+            export(image, args)
         if kind in LAYERED:
             layered(image, output, kind, args)
-        else:
+        elif rendering:
             render(image, output, args)
-        if not args.quiet:
-            print(f"{output}: {time.perf_counter() - started:.2f} s", file=sys.stderr)
+    if rendering and not args.quiet:
+        print(f"{output}: {time.perf_counter() - started:.2f} s", file=sys.stderr)
     damage: Sequence[str] = image.damage
     return damage
 

@@ -9,9 +9,9 @@ from dataclasses import fields
 
 from ..container.chunks import Chunk
 from ..container.file import assemble, parse_within
-from ..errors import LimitError, PxiError
+from ..errors import PxiError
 from ..io.files import read_bytes
-from ..limits import DEFAULT_LIMITS, Budget, Limits
+from ..limits import DEFAULT_LIMITS, Budget, Limits, enough_memory
 from ..model import Picture
 from .unpack import unpack
 
@@ -33,7 +33,7 @@ def from_bytes(data: bytes, limits: Limits = DEFAULT_LIMITS, *, tolerant: bool =
         LimitError: The file exceeds `limits`.
     """
     damage: tuple[str, ...] = ()
-    try:
+    with enough_memory("for the file"):
         if tolerant:
             from . import salvage
 
@@ -42,8 +42,6 @@ def from_bytes(data: bytes, limits: Limits = DEFAULT_LIMITS, *, tolerant: bool =
         else:
             budget = Budget(limits)
             picture = unpack(parse_within(data, budget), budget)
-    except MemoryError:
-        raise LimitError("there is not enough memory for the file") from None
     if damage:
         logging.getLogger(__name__).warning("the file is damaged: %s", "; ".join(damage))
     return picture

@@ -18,7 +18,7 @@ from .. import plugins
 from ..errors import InputError
 from ..geometry.pose import OPACITY_MAX, Pose
 from ..io.samples import to_float
-from ..limits import DEFAULT_LIMITS
+from ..limits import DEFAULT_LIMITS, enough_memory
 from ..model import Layer, Layers, Picture
 from ..texture.implicit import ImplicitTexture
 from ..texture.network import Floats, NetShape, Network
@@ -57,12 +57,14 @@ def encode_layers(
         InputError: No layer is left, or a mesher fails.
         UsageError: A metadata block is invalid, or there is no such mesher.
         UnsupportedError: A package that is needed is not installed.
-        LimitError: The canvas is larger than readers accept by default.
+        LimitError: The canvas is larger than readers accept by default, or needs more memory than
+            there is.
     """
     found, kept = encode_layered(picture, settings, progress)
     return plugins.find("handles", "image")(found), kept
 
 
+@enough_memory("to encode the picture; make it smaller, or encode it in parts")
 def encode_layered(
     picture: LayeredPicture, settings: Settings | None = None, progress: Progress | None = None
 ) -> tuple[Picture, LayeredPicture]:

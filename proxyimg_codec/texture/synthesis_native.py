@@ -9,6 +9,7 @@ import ctypes as ct
 
 import numpy as np
 
+from ..errors import LimitError
 from ..native import kernel
 from .context import Ints
 from .network import Floats
@@ -46,7 +47,7 @@ def finer(
         float32 [2 h, 2 w, 3] planes.
 
     Raises:
-        MemoryError: The kernel cannot allocate what it needs.
+        LimitError: The kernel cannot allocate what it needs.
     """
     lib = kernel.library()
     assert lib is not None, "check available() first"
@@ -60,5 +61,5 @@ def finer(
         *map(kernel.pointer, arrays), len(bias), h, w, *map(kernel.pointer, (low, latents, out))
     )
     if lib.pxi_pyramid_synthesis(ct.byref(level)):
-        raise MemoryError("not enough memory to decode a pyramid")
+        raise LimitError("there is not enough memory to decode a pyramid")
     return out
