@@ -219,6 +219,27 @@ def test_what_is_not_supported(stack, words):
     refused(pxi.UnsupportedError, ora(stack, a=PNG, text=b"hello", cut=PNG[:20]), *words)
 
 
+SHADE = layer("nowhere", name="shade", composite_op="svg:multiply", visibility="hidden")
+NESTED = f'<stack name="g" composite-op="svg:screen">{layer()}{layer(name="x", y="1.5")}</stack>'
+
+
+@pytest.mark.parametrize(
+    ("stack", "left_out", "kept"),
+    [
+        (SHADE, ("shade",), ["cat"]),
+        (SHADE + layer(name="shade"), ("shade 2",), ["cat", "shade"]),
+        (SHADE.replace('"hidden"', '"visible" opacity="0"'), ("shade",), ["cat"]),
+        (f'<stack visibility="hidden" name="off">{NESTED}</stack>', ("g",), ["cat"]),
+        (f'<stack opacity="0.0">{SHADE.replace("hidden", "visible")}</stack>', ("shade",), ["cat"]),
+        ('<filter name="blur" visibility="hidden"/>', ("blur",), ["cat"]),
+        (layer(name="off", visibility="hidden"), (), ["cat", "off"]),
+    ],
+)
+def test_what_is_not_supported_but_hidden_is_left_out(stack, left_out, kept):
+    picture = read(ora(stack + layer(name="cat"), a=PNG))
+    assert (picture.left_out, sorted(v.name for v in picture.layers)) == (left_out, kept)
+
+
 def test_damaged_pixels():
     refused(pxi.InputError, ora(layer(name="cat"), a=PNG[:-40]), "layer 'cat'", "damaged")
     data = ora(layer(name="cat"), a=PNG)
