@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..animate.presets import PRESETS
-from ..errors import UsageError
+from ..errors import FormatError, UsageError
 from .common import EXIT_CODES, Bar, add_limits, check_target, key, limits_of, parser, run
 
 if TYPE_CHECKING:
@@ -82,10 +82,11 @@ def animate_file(args: argparse.Namespace) -> None:
     check(args, clip)
 
     from ..api import open_image
+    from ..io.files import naming
     from ..native import kernel
 
     started = time.perf_counter()
-    with kernel.for_engine(args.engine):
+    with kernel.for_engine(args.engine), naming(args.input, FormatError):
         image = open_image(args.input, limits_of(args))
         if args.preset or args.motion:
             image = moving(image, args)

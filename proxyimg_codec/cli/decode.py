@@ -7,11 +7,12 @@ import logging
 import os
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from ..errors import UsageError
+from ..errors import FormatError, UsageError
 from .common import (
     EXIT_CODES,
     Bar,
@@ -26,6 +27,9 @@ from .common import (
 
 LAYERED = (".ora", ".svg")
 """Suffixes of output files that hold layers instead of one flat picture."""
+
+SIGNATURE = "CON-2"
+"""Rule that what is no `.pxi` file breaks: of that nothing can be decoded."""
 
 DAMAGED = 7
 """Exit code if a damaged file could be decoded only in part."""
@@ -108,7 +112,7 @@ def decode_file(args: argparse.Namespace) -> Sequence[str]:
     from ..native import kernel
 
     started = time.perf_counter()
-    with kernel.for_engine(args.engine):
+    with kernel.for_engine(args.engine), about_input(args):
         image = open_image(args.input, limits_of(args), tolerant=args.tolerant)
         if args.time is not None:
             image = image.at(args.time)
@@ -122,6 +126,23 @@ def decode_file(args: argparse.Namespace) -> Sequence[str]:
         print(f"{output}: {time.perf_counter() - started:.2f} s", file=sys.stderr)
     damage: Sequence[str] = image.damage
     return damage
+
+
+@contextmanager
+def about_input(args: argparse.Namespace) -> Iterator[None]:
+    """Context in which errors of the format name the input, and the flag that may help.
+
+    They are found when the file is opened, or when its textures are decoded.
+    """
+    from ..io.files import naming
+
+    with naming(args.input, FormatError):
+        try:
+            yield
+        except FormatError as error:
+            if not args.tolerant and error.rule != SIGNATURE:
+                error.args = (f"{error}; --tolerant decodes as much as is left",)
+            raise
 
 
 def refuse_render_flags(args: argparse.Namespace) -> None:

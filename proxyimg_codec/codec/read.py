@@ -9,8 +9,7 @@ from dataclasses import fields
 
 from ..container.chunks import Chunk
 from ..container.file import assemble, parse_within
-from ..errors import PxiError
-from ..io.files import read_bytes
+from ..io.files import naming, read_bytes
 from ..limits import DEFAULT_LIMITS, Budget, Limits, enough_memory
 from ..model import Picture
 from .unpack import unpack
@@ -61,12 +60,8 @@ def from_file(
         InputError: The file cannot be read.
         FormatError, UnsupportedError, LimitError: As `from_bytes`.
     """
-    data = read_bytes(path)
-    try:
-        return from_bytes(data, limits, tolerant=tolerant)
-    except PxiError as error:
-        error.args = (f"{os.fspath(path)}: {error}",)
-        raise
+    with naming(path):
+        return from_bytes(read_bytes(path), limits, tolerant=tolerant)
 
 
 def from_own_bytes(data: bytes) -> Picture:
