@@ -145,5 +145,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 1 if failed else 0
 
 
+def command_line() -> int:
+    """Runs `main` as a program: if nobody reads its output any more, the rest is dropped."""
+    try:
+        try:
+            return main()
+        finally:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 3
+
+
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(command_line())

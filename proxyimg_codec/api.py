@@ -201,7 +201,8 @@ class Image(PictureHandle):
             layers: Names or positions of the layers to draw; by default all that are not hidden.
             background: Whether to draw the back layer of an opaque picture.
             dtype: uint8 or uint16 (rounded), or float32 in 0..1.
-            engine: ``auto``, ``numpy``, ``native`` or ``ort``.
+            engine: ``auto``, ``numpy``, ``native`` or ``ort``; ``numpy`` does without the compiled
+                kernel, also for what is decoded only now.
             limits: Bounds on the size of the output and on the work it may take.
             progress: Called after each tile with the number of its pixels.
 
@@ -210,10 +211,11 @@ class Image(PictureHandle):
             is drawn, otherwise [height, width, 4] with straight alpha.
 
         Raises:
-            UsageError: The arguments contradict each other or are out of range, a layer is
-                unknown, or `t` is given for a picture without a timeline.
-            UnsupportedError: The engine is not installed.
-            LimitError: The output is too large, or takes too much work.
+            UsageError: An argument has a wrong type or is out of range, arguments contradict each
+                other, the layer or engine is unknown, no layer is left, or `t` is given for a
+                picture without a timeline.
+            UnsupportedError: The engine, or a package that it needs, is not installed.
+            LimitError: The output is too large, takes too much work, or more memory than there is.
             FormatError: A coded stream that is decoded only now is corrupt.
 
         Examples:
@@ -379,7 +381,8 @@ def encode(
         InputError: The array cannot be a picture, or a mask is none or does not fit it.
         UsageError: A setting is out of range.
         UnsupportedError: A package that is needed is not installed.
-        LimitError: The picture is larger than readers accept by default.
+        LimitError: The picture is larger than readers accept by default, or needs more memory than
+            there is.
 
     Examples:
         >>> import numpy as np

@@ -8,6 +8,8 @@ Public functions take `Limits`; a function that takes a `Budget` is one of those
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, fields
 
 from .errors import LimitError
@@ -137,3 +139,19 @@ SMALL = {f.name.removeprefix("small_"): f.name for f in fields(Limits) if "small
 """Names of the limits of small files, by the names of the general limits that they tighten."""
 
 DEFAULT_LIMITS = Limits()
+
+
+@contextmanager
+def enough_memory(purpose: str) -> Iterator[None]:
+    """Context, or decorator, in which a `MemoryError` becomes a `LimitError`.
+
+    Args:
+        purpose: End of the message, such as ``"for the file"``.
+
+    Raises:
+        LimitError: There is not enough memory.
+    """
+    try:
+        yield
+    except MemoryError:
+        raise LimitError(f"there is not enough memory {purpose}") from None

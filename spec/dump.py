@@ -12,6 +12,7 @@ import msgpack
 import numpy as np
 
 from proxyimg_codec.api import Image, from_bytes
+from proxyimg_codec.cli.common import run
 from proxyimg_codec.container import chunks
 from proxyimg_codec.container.fields import unpack
 from proxyimg_codec.container.file import fields_of
@@ -21,7 +22,7 @@ from proxyimg_codec.geometry.boundary import Boundary
 from proxyimg_codec.geometry.mesh import Refined
 from proxyimg_codec.geometry.pose import Pose
 from proxyimg_codec.geometry.track import Track
-from proxyimg_codec.io.files import read_bytes
+from proxyimg_codec.io.files import naming, read_bytes
 from proxyimg_codec.texture.diffusion import fill
 from proxyimg_codec.texture.planes import Planes
 from proxyimg_codec.texture.pyramid import PyramidTexture, Texture
@@ -308,15 +309,14 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("file", type=Path)
     parser.add_argument("--values", action="store_true", help="print the decoded integers instead")
     args = parser.parse_args(argv)
-    try:
-        data = read_bytes(args.file)
-        lines = values(from_bytes(data)) if args.values else dump(data)
-        for line in lines:
-            print(line)
-    except PxiError as error:
-        print(f"spec.dump: {error}", file=sys.stderr)
-        return error.exit_code
-    return 0
+
+    def write() -> None:
+        with naming(args.file):
+            data = read_bytes(args.file)
+            for line in values(from_bytes(data)) if args.values else dump(data):
+                print(line)
+
+    return run("spec.dump", write)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ import { encodePng } from "./png.mjs";
 import { Image, MODEL_FILES, PxiError, render } from "./pxi/index.js";
 
 const USAGE = `usage: node web/decode.mjs IN.pxi OUT.png [--width N] [--height N] [--scale S]
-         [--region X,Y,W,H] [--time S] [--layer NAME].. [--no-background] [--bit-depth 8|16]
+         [--region X,Y,W,H] [--time S] [--layer NAME|INDEX].. [--no-background] [--bit-depth 8|16]
        node web/decode.mjs --latents IN.pxi
        node web/decode.mjs --batch`;
 const EXIT = { usage: 2, io: 3, invalid: 4, unsupported: 5, limit: 6 };
@@ -34,45 +34,16 @@ function number(text, pattern, name) {
 const COUNT = /^[1-9][0-9]{0,8}$/;
 const DECIMAL = /^[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?$/;
 
-/** The nearest integer, ties to even, at least 1. */
-function nearest(value) {
-  const low = Math.floor(value);
-  const up = value - low > 0.5 || (value - low === 0.5 && low % 2 === 1);
-  return Math.max(low + up, 1);
-}
-
-/** What `render` needs, from the flags. */
-function view(image, flags) {
-  const region = (flags.region ?? `0,0,${image.width},${image.height}`).split(",").map((part) => {
-    return number(part, /^[0-9]{1,8}$/, "region");
-  });
-  const [x, y, w, h] = region;
-  const inside = region.length === 4 && x + w <= image.width && y + h <= image.height;
-  if (!inside || w < 1 || h < 1) throw new UsageError("--region is not in the canvas");
-  let width = flags.width && number(flags.width, COUNT, "width");
-  let height = flags.height && number(flags.height, COUNT, "height");
-  const scale = flags.scale ? number(flags.scale, DECIMAL, "scale") : 1;
-  if (!(scale > 0)) throw new UsageError("--scale is not positive");
-  if (width) height ??= nearest((h * width) / w);
-  else if (height) width = nearest((w * height) / h);
-  else [width, height] = [nearest(w * scale), nearest(h * scale)];
-  const time = flags.time === undefined ? null : number(flags.time, DECIMAL, "time");
-  if (time !== null && !image.motion) throw new UsageError("--time: this file has no motion");
+/** Options of `render`, from the flags. */
+function view(flags) {
+  const whole = (name) => flags[name] && number(flags[name], COUNT, name);
+  const decimal = (name) => flags[name] && number(flags[name], DECIMAL, name);
   return {
-    region, width, height, drawn: layers(image, flags),
-    time: time === null ? null : Math.round(time * 1e6),
+    t: decimal("time"), width: whole("width"), height: whole("height"), scale: decimal("scale"),
+    region: flags.region?.split(",").map((part) => number(part, /^[0-9]{1,8}$/, "region")),
+    layers: flags.layer?.map((key) => (/^-?[0-9]{1,9}$/.test(key) ? Number(key) : key)),
+    background: !flags["no-background"],
   };
-}
-
-function layers(image, flags) {
-  const names = flags.layer;
-  for (const name of names ?? []) {
-    if (!image.names.some((l) => l.name === name)) throw new UsageError(`no layer ${name}`);
-  }
-  return image.names.flatMap(({ name, hidden }, k) => {
-    const wanted = names ? names.includes(name) : !hidden;
-    return wanted && !(k === 0 && flags["no-background"] && image.head.opaque) ? [k] : [];
-  });
 }
 
 /** SHA-256 of all latents (PYR-29). */
@@ -100,7 +71,7 @@ async function run(words) {
       console.log(digest(image));
       return 0;
     }
-    const png = encodePng(render(image, view(image, flags)), Number(bits));
+    const png = encodePng(render(image, view(flags)), Number(bits));
     output = positionals[1];
     writeFileSync(output, png);
     return 0;

@@ -90,8 +90,7 @@ async function refresh() {
     if (!wanted) break;
     const started = performance.now();
     try {
-      const microseconds = time === null ? null : Math.round(time * 1e6);
-      const answer = await decoder.ask("render", { ...wanted, drawn, time: microseconds });
+      const answer = await decoder.ask("render", { ...wanted, layers: drawn, t: time });
       const data = new ImageData(answer.pixels, answer.width, answer.height);
       if (state.picture !== picture) continue;
       state.shown = { bitmap: await createImageBitmap(data), region: wanted.region, draft };

@@ -17,9 +17,11 @@ const tasks = {
     return { width, height, layers: names, duration: motion ? motion.duration / 1000 : 0 };
   },
 
-  async render(options) {
-    const { width, height, pixels } = bytesOf(render(image, options));
-    return { width, height, pixels };
+  async render({ region, width, height, layers, t }) {
+    if (!layers.length) {
+      return { width, height, pixels: new Uint8ClampedArray(4 * width * height) };
+    }
+    return bytesOf(render(image, { region, width, height, layers, t, dtype: "uint8" }));
   },
 };
 
@@ -27,7 +29,7 @@ const tasks = {
 function bytesOf({ width, height, channels, data }) {
   const pixels = new Uint8ClampedArray(4 * width * height).fill(255);
   for (let i = 0, from = 0; i < pixels.length; i += 4, from += channels) {
-    for (let c = 0; c < channels; c++) pixels[i + c] = data[from + c] * 255; // rounds by itself
+    for (let c = 0; c < channels; c++) pixels[i + c] = data[from + c];
   }
   return { width, height, pixels };
 }

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..animate.presets import PRESETS
-from ..errors import UsageError
+from ..errors import FormatError, UsageError
 from .common import EXIT_CODES, Bar, add_limits, key, limits_of, parser, printable, run
 from .places import check_target
 
@@ -59,7 +59,7 @@ def arguments() -> argparse.ArgumentParser:
     add("--quality", type=int, metavar="0-100", help="of .mp4, .webm and .webp; 90 by default")
     add("--sheet", action="store_true", help="OUT.png is a sprite sheet")
     add("--engine", choices=["auto", "numpy", "native", "ort"], default="auto",
-        help="who runs the networks")  # fmt: skip
+        help="who draws, as for pxi-decode")  # fmt: skip
     add("-j", "--jobs", type=int, default=2, metavar="N", help="cores to use, by threads; 2 by "
         "default")  # fmt: skip
     add_limits(p)
@@ -84,16 +84,19 @@ def animate_file(args: argparse.Namespace) -> None:
     check(args, clip)
 
     from ..api import open_image
+    from ..io.files import naming
+    from ..native import kernel
 
     started = time.perf_counter()
-    image = open_image(args.input, limits_of(args))
-    if args.preset or args.motion:
-        image = moving(image, args)
-    elif image.timeline is None:
-        raise UsageError(f"{args.input} does not move by itself; give --preset or --motion")
-    elif not clip:
-        raise UsageError("the picture moves already; give another --preset or --motion")
-    said = write_clip(image, args) if clip else write_picture(image, args)
+    with kernel.for_engine(args.engine), naming(args.input, FormatError):
+        image = open_image(args.input, limits_of(args))
+        if args.preset or args.motion:
+            image = moving(image, args)
+        elif image.timeline is None:
+            raise UsageError(f"{args.input} does not move by itself; give --preset or --motion")
+        elif not clip:
+            raise UsageError("the picture moves already; give another --preset or --motion")
+        said = write_clip(image, args) if clip else write_picture(image, args)
     if not args.quiet:
         seconds = time.perf_counter() - started
         print(f"{printable(args.output)}: {said}, {seconds:.1f} s", file=sys.stderr)

@@ -5,11 +5,12 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from ..errors import UsageError
+from ..errors import FormatError, UsageError
 from .common import (
     EXIT_CODES,
     Bar,
@@ -24,6 +25,9 @@ from .places import add_files, check_target, default_target, each, is_stream, pa
 
 LAYERED = (".ora", ".svg")
 """Suffixes of output files that hold layers instead of one flat picture."""
+
+SIGNATURE = "CON-2"
+"""Rule that what is no `.pxi` file breaks: of that nothing can be decoded."""
 
 DAMAGED = 7
 """Exit code if a damaged file could be decoded only in part."""
@@ -52,7 +56,7 @@ def arguments() -> argparse.ArgumentParser:
     add("--srgb", action="store_true", help="convert to sRGB; by default the colours are those of "
         "the file, and OUT says what they are if it can")  # fmt: skip
     add("--engine", choices=["auto", "numpy", "native", "ort"], default="auto",
-        help="who runs the networks; auto is the fastest that is built in")  # fmt: skip
+        help="who decodes; auto is the fastest that is built in, numpy is numpy alone")  # fmt: skip
     add("--tolerant", action="store_true", help="of a file that is cut off or damaged, make the "
         "picture from the levels that can be decoded, say so, and exit with 7")  # fmt: skip
     add("--export-onnx", metavar="FILE", help="write the decoder network as ONNX; of a pyramid "
@@ -112,17 +116,19 @@ def decode_file(args: argparse.Namespace) -> Sequence[str]:
             raise UsageError(f"{output}: the picture and the ONNX model need two files")
 
     from ..api import open_image
+    from ..native import kernel
 
     started = time.perf_counter()
-    image = open_image(args.input, limits_of(args), tolerant=args.tolerant)
-    if args.time is not None:
-        image = image.at(args.time)
-    if args.export_onnx is not None:
-        export(image, args)
-    if rendering:
-        draw(image, output, args)
-        if not args.quiet:
-            print(f"{printable(output)}: {time.perf_counter() - started:.2f} s", file=sys.stderr)
+    with kernel.for_engine(args.engine), about_input(args):
+        image = open_image(args.input, limits_of(args), tolerant=args.tolerant)
+        if args.time is not None:
+            image = image.at(args.time)
+        if args.export_onnx is not None:
+            export(image, args)
+        if rendering:
+            draw(image, output, args)
+    if rendering and not args.quiet:
+        print(f"{printable(output)}: {time.perf_counter() - started:.2f} s", file=sys.stderr)
     damage: Sequence[str] = image.damage
     return damage
 
@@ -134,6 +140,23 @@ def draw(image: Any, output: str, args: argparse.Namespace) -> None:
         layered(image, output, kind, args)
     else:
         render(image, output, args)
+
+
+@contextmanager
+def about_input(args: argparse.Namespace) -> Iterator[None]:
+    """Context in which errors of the format name the input, and the flag that may help.
+
+    They are found when the file is opened, or when its textures are decoded.
+    """
+    from ..io.files import naming
+
+    with naming(args.input, FormatError):
+        try:
+            yield
+        except FormatError as error:
+            if not args.tolerant and error.rule != SIGNATURE:
+                error.args = (f"{error}; --tolerant decodes as much as is left",)
+            raise
 
 
 def refuse_render_flags(args: argparse.Namespace) -> None:

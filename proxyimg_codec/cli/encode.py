@@ -221,9 +221,10 @@ def encoded(source: bytes, args: argparse.Namespace, settings: Any, bar: Bar) ->
 
     def progress(stage: str, done: int, total: int) -> None:
         nonlocal seen
-        if stage == "texture":
-            bar.advance(done - seen)
-            seen = done
+        reached = done * settings.steps // total
+        if stage == "texture" and reached > seen:
+            bar.advance(reached - seen)
+            seen = reached
 
     name = "standard input" if args.input == "-" else args.input
     if is_openraster(source) or Path(args.input).suffix.lower() == ".ora":

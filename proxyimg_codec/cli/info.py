@@ -12,7 +12,7 @@ from ..container import texr
 from ..container.chunks import VERSION
 from ..container.content import Container
 from ..container.file import parse
-from ..io.files import read_bytes
+from ..io.files import naming, read_bytes
 from .common import add_limits, limits_of, parser, printable, run
 
 CODERS = {texr.IMPLICIT: "implicit", texr.PYRAMID: "pyramid"}
@@ -44,8 +44,9 @@ def show(args: argparse.Namespace) -> None:
         PxiError: The file cannot be read.
     """
     limits = limits_of(args)
-    data = read_bytes(args.input)
-    facts = describe(parse(data, limits), len(data))
+    with naming(args.input):
+        data = read_bytes(args.input)
+        facts = describe(parse(data, limits), len(data))
     print(json.dumps(facts, indent=2) if args.json else text(facts))
 
 

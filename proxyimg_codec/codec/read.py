@@ -9,9 +9,8 @@ from dataclasses import fields
 
 from ..container.chunks import Chunk
 from ..container.file import assemble, parse_within
-from ..errors import LimitError, PxiError
-from ..io.files import read_bytes
-from ..limits import DEFAULT_LIMITS, Budget, Limits
+from ..io.files import naming, read_bytes
+from ..limits import DEFAULT_LIMITS, Budget, Limits, enough_memory
 from ..model import Picture
 from .unpack import unpack
 
@@ -33,7 +32,7 @@ def from_bytes(data: bytes, limits: Limits = DEFAULT_LIMITS, *, tolerant: bool =
         LimitError: The file exceeds `limits`.
     """
     damage: tuple[str, ...] = ()
-    try:
+    with enough_memory("for the file"):
         if tolerant:
             from . import salvage
 
@@ -42,8 +41,6 @@ def from_bytes(data: bytes, limits: Limits = DEFAULT_LIMITS, *, tolerant: bool =
         else:
             budget = Budget(limits)
             picture = unpack(parse_within(data, budget), budget)
-    except MemoryError:
-        raise LimitError("there is not enough memory for the file") from None
     if damage:
         logging.getLogger(__name__).warning("the file is damaged: %s", "; ".join(damage))
     return picture
@@ -63,12 +60,8 @@ def from_file(
         InputError: The file cannot be read.
         FormatError, UnsupportedError, LimitError: As `from_bytes`.
     """
-    data = read_bytes(path)
-    try:
-        return from_bytes(data, limits, tolerant=tolerant)
-    except PxiError as error:
-        error.args = (f"{os.fspath(path)}: {error}",)
-        raise
+    with naming(path):
+        return from_bytes(read_bytes(path), limits, tolerant=tolerant)
 
 
 def from_own_bytes(data: bytes) -> Picture:

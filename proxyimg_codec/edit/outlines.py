@@ -6,6 +6,8 @@ The file is one that `export.svg` wrote and that was edited by hand, or one like
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
+from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -17,7 +19,11 @@ from ..io import xml
 from ..limits import DEFAULT_LIMITS, Limits
 from ..model import Layer, Picture, Pictured
 from ..render.neighbours import present_outline
-from .svg_shapes import Points, curves_of, page_of, shapes, tag_of
+from .svg_shapes import Points, curves_of, page_of, shapes
+from .svg_style import check_document, fill_rule, tag_of
+
+OTHERS = ("text", "image", "line", "foreignObject")
+"""Elements that are drawn and have no outline that could be taken."""
 
 UNITS = (6, 5, 4)
 """Units of new boundaries, the finest first; the first in which all coordinates fit is taken."""
@@ -35,8 +41,9 @@ def load(
     """Reads the outlines in an SVG file, by the name of the layer that each belongs to.
 
     The page is the canvas. A shape belongs to the layer that its Inkscape label, id or title names.
-    Transforms are applied and open paths are closed; lines, quadratic curves and arcs become cubic
-    curves. Coordinates that are multiples of the unit of a layer at rest keep that unit, so that an
+    Transforms are applied, as attributes and in styles, and open paths are closed; lines, quadratic
+    curves and arcs become cubic curves. Fills, strokes, opacity and visibility are not read.
+    Coordinates that are multiples of the unit of a layer at rest keep that unit, so that an
     unchanged file gives identical control points. Two kinds of shapes are skipped: the rectangle of
     a layer that covers the whole canvas, and an unchanged outline of a layer that is not at rest,
     because no file can hold its unit.
@@ -50,8 +57,9 @@ def load(
     Raises:
         InputError: The file is not SVG, has no outlines, or has a shape that belongs to no layer or
             cannot be a boundary.
-        UnsupportedError: The file has clones, nested documents or holes filled by the even-odd
-            rule.
+        UnsupportedError: The file has clones, nested documents, clips, masks, animations, style
+            sheets that move or cut shapes, transforms of other kinds, or holes filled by the
+            even-odd rule; or text, a picture or a line has the name of a layer.
         LimitError: The file has too many segments.
     """
     picture = image.picture
@@ -60,18 +68,24 @@ def load(
         raise InputError(f"{name}: not an SVG file, its root element is {root.tag[:80]!r}")
     drawn = [e.get(key, "") for e in root.iter() for key in ("d", "points")]
     limits.check("segments", sum(1 for text in drawn for _ in _TOKEN.finditer(text)) // 7)
+    check_document(root, data, name)
+    known = _Known.of(picture)
+    _check_others(root, known, name)
     page, size = page_of(root, picture, name)
     found: dict[str, Boundary | None] = {}
-    for element, matrix in shapes(root, page, name):
-        layer = _layer_of(element, picture, name)
+    for element, matrix, rule in shapes(root, page, name, fill_rule(root, "nonzero")):
+        layer = _layer_of(element, known, name)
         where = f"{name}: layer {layer.name!r}"
         if layer.name in found:
             raise InputError(f"{where}: two shapes have its name; combine them into one path")
         curves = curves_of(element, size, where)
         with np.errstate(all="ignore"):  # what overflows is refused below
             curves = [c @ matrix[:2, :2].T + matrix[:2, 2] for c in curves]
-        if len(curves) > 1:
-            _check_fill_rule(element, where)
+        if len(curves) > 1 and rule == "evenodd":
+            raise UnsupportedError(
+                f"{where}: fill-rule evenodd is not supported; set it to nonzero and make its "
+                "holes run the other way (in Inkscape: Path > Union)"
+            )
         found[layer.name] = _boundary(curves, layer, picture, where)
         segments = sum(sum(b.segments) for b in found.values() if b is not None)
         limits.check("segments", segments)
@@ -80,35 +94,59 @@ def load(
     return {layer: boundary for layer, boundary in found.items() if boundary is not None}
 
 
-def _check_fill_rule(element: Element, where: str) -> None:
-    """Refuses a shape of several paths that is filled by the even-odd rule."""
-    styled = re.search(r"fill-rule\s*:\s*(\w+)", element.get("style", ""))
-    rule = styled[1] if styled else element.get("fill-rule", "nonzero")
-    if rule == "evenodd":
-        raise UnsupportedError(
-            f"{where}: fill-rule evenodd is not supported; set it to nonzero and make its "
-            "holes run the other way (in Inkscape: Path > Union)"
-        )
+class _Known(NamedTuple):
+    """Layers by their names and by the ids that the export gives them."""
+
+    by_name: Mapping[str, Layer]
+    by_id: Mapping[str, Layer]
+
+    @classmethod
+    def of(cls, picture: Picture) -> _Known:
+        names = [layer.name for layer in picture.layers]
+        by_name = {xml.text(layer.name): layer for layer in picture.layers}
+        return cls(by_name, dict(zip(identifiers(names), picture.layers, strict=True)))
+
+    def named(self, element: Element) -> Layer | None:
+        """Layer that the label, id or title of an element names, or None."""
+        label, id_ = element.get(f"{{{INKSCAPE}}}label", ""), element.get("id", "")
+        for key, known in (
+            (label, self.by_name), (id_, self.by_id), (id_, self.by_name),
+            (_title(element), self.by_name),
+        ):  # fmt: skip
+            if key in known:
+                return known[key]
+        return None
 
 
-def _layer_of(element: Element, picture: Picture, name: str) -> Layer:
+def _title(element: Element) -> str:
+    return next((child.text or "" for child in element if tag_of(child) == "title"), "")
+
+
+def _layer_of(element: Element, known: _Known, name: str) -> Layer:
     """Layer that the label, id or title of a shape names.
 
     Raises:
         InputError: They name no layer.
     """
-    names = [layer.name for layer in picture.layers]
-    by_id = dict(zip(identifiers(names), picture.layers, strict=True))
-    by_name = {xml.text(layer.name): layer for layer in picture.layers}
-    title = next((child.text or "" for child in element if tag_of(child) == "title"), "")
-    label, id_ = element.get(f"{{{INKSCAPE}}}label", ""), element.get("id", "")
-    for layer in (by_name.get(label), by_id.get(id_), by_name.get(id_), by_name.get(title)):
-        if layer is not None:
-            return layer
+    layer = known.named(element)
+    if layer is not None:
+        return layer
+    label = element.get(f"{{{INKSCAPE}}}label") or element.get("id") or _title(element)
+    names = ", ".join(repr(layer.name) for layer in known.by_id.values())
     raise InputError(
-        f"{name}: {tag_of(element)} {label or id_ or title!r} has the name of no layer; delete it, "
-        f"or label it with one of {', '.join(map(repr, names))}"
+        f"{name}: {tag_of(element)} {label!r} has the name of no layer; delete it, or label it "
+        f"with one of {names}"
     )
+
+
+def _check_others(root: Element, known: _Known, name: str) -> None:
+    """Refuses text, pictures and lines that are named like layers: they are no outlines."""
+    for element in root.iter():
+        if tag_of(element) in OTHERS and known.named(element) is not None:
+            raise UnsupportedError(
+                f"{name}: {tag_of(element)} {element.get('id', '')!r} has the name of a layer, but "
+                "cannot be an outline; make it a path"
+            )
 
 
 def _boundary(curves: list[Points], layer: Layer, picture: Picture, where: str) -> Boundary | None:

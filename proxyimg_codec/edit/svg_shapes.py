@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, UnsupportedError
-from ..export.svg import NAMESPACE
 from ..model import Picture
+from .svg_style import fill_rule, tag_of, transform_of
 
 try:
     import svgelements
@@ -36,12 +36,6 @@ ASPECT = 0.005
 
 _MALFORMED = (ValueError, AttributeError, TypeError, IndexError, KeyError, ArithmeticError)
 """Exceptions that svgelements raises on malformed data."""
-
-
-def tag_of(element: Element) -> str:
-    """Local name of an SVG element; empty for elements of other namespaces."""
-    namespace, _, local = element.tag.rpartition("}")
-    return local if namespace in ("", "{" + NAMESPACE) else ""
 
 
 def page_of(root: Element, picture: Picture, name: str) -> tuple[Points, tuple[float, float]]:
@@ -69,6 +63,7 @@ def page_of(root: Element, picture: Picture, name: str) -> tuple[Points, tuple[f
             )
         scale = picture.width / width, picture.height / height
         good = all(map(math.isfinite, (x, y, *scale))) and min(scale) > 0
+        stretch = _stretch(root, width / height)
     except _MALFORMED:
         good = False
     if not good:
@@ -78,9 +73,22 @@ def page_of(root: Element, picture: Picture, name: str) -> tuple[Points, tuple[f
             f"{name}: the page of {width:g}x{height:g} has another shape than the canvas of "
             f"{picture.width}x{picture.height}; set the page back"
         )
+    if abs(stretch - 1) > ASPECT:
+        raise InputError(
+            f"{name}: width and height have another shape than the viewBox; make them alike"
+        )
     matrix = np.diag([*scale, 1.0])
     matrix[:2, 2] = -scale[0] * x, -scale[1] * y
     return matrix, (width, height)
+
+
+def _stretch(root: Element, aspect: float) -> float:
+    """Aspect ratio of width and height relative to that of the viewBox; 1 if they do not say."""
+    lengths = [root.get(key, "100%") for key in ("width", "height")]
+    if any("%" in v or v.strip() == "auto" for v in lengths):
+        return 1.0
+    width, height = (_pixels(v, 0) for v in lengths)
+    return width / height / aspect
 
 
 def _pixels(length: str, whole: int) -> float:
@@ -90,19 +98,23 @@ def _pixels(length: str, whole: int) -> float:
     return float(svgelements.Length(length).value(ppi=96))
 
 
-def shapes(parent: Element, matrix: Points, name: str) -> Iterator[tuple[Element, Points]]:
+def shapes(
+    parent: Element, matrix: Points, name: str, rule: str = "nonzero"
+) -> Iterator[tuple[Element, Points, str]]:
     """Finds all shapes that are drawn, and their transforms to the canvas.
 
     Args:
         parent: The element whose descendants are searched.
         matrix: float64 [3, 3] transform of `parent` to canvas pixels.
         name: Name of the file in error messages.
+        rule: Rule by which `parent` is filled.
 
     Yields:
-        Each shape and its transform, float64 [3, 3].
+        Each shape, its transform, float64 [3, 3], and the rule by which it is filled.
 
     Raises:
-        UnsupportedError: The file has clones or nested documents.
+        UnsupportedError: The file has clones, nested documents, or shapes that are moved or cut in
+            a way that cannot be applied.
         InputError: A transform is malformed.
     """
     for element in parent:
@@ -114,20 +126,31 @@ def shapes(parent: Element, matrix: Points, name: str) -> Iterator[tuple[Element
             )
         if tag not in SHAPES and tag not in GROUPS:
             continue
-        try:
-            m = svgelements.Matrix(element.get("transform", ""))
-            m.render(ppi=96)
-            own = np.array([[m.a, m.c, m.e], [m.b, m.d, m.f], [0, 0, 1]], np.float64)
-            with np.errstate(all="ignore"):  # coordinates that overflow are refused later
-                placed = matrix @ own
-        except _MALFORMED:
-            raise InputError(
-                f"{name}: the transform of {tag} {element.get('id', '')!r} cannot be read"
-            ) from None
+        if tag == "switch" and sum(tag_of(v) in (*SHAPES, *GROUPS) for v in element) > 1:
+            raise UnsupportedError(f"{name}: switch is not supported; keep one of its choices")
+        with np.errstate(all="ignore"):  # coordinates that overflow are refused later
+            placed = matrix @ _own(element, f"{name}: {tag} {element.get('id', '')!r}")
+        filled = fill_rule(element, rule)
         if tag in GROUPS:
-            yield from shapes(element, placed, name)
+            yield from shapes(element, placed, name, filled)
         else:
-            yield element, placed
+            yield element, placed, filled
+
+
+def _own(element: Element, where: str) -> Points:
+    """Transform float64 [3, 3] of an element itself."""
+    text, origin = transform_of(element, where)
+    try:
+        x, y = (_pixels(v, 0) for v in origin)
+        m = svgelements.Matrix(text)
+        m.render(ppi=96)
+    except _MALFORMED:
+        raise InputError(f"{where}: the transform {text[:60]!r} cannot be read") from None
+    there = np.array([[1, 0, x], [0, 1, y], [0, 0, 1]], np.float64)
+    own = np.array([[m.a, m.c, m.e], [m.b, m.d, m.f], [0, 0, 1]], np.float64)
+    back = np.array([[1, 0, -x], [0, 1, -y], [0, 0, 1]], np.float64)
+    placed: Points = there @ own @ back
+    return placed
 
 
 def curves_of(element: Element, size: tuple[float, float], where: str) -> list[Points]:

@@ -16,7 +16,7 @@ from ..container import meta
 from ..errors import UsageError
 from ..io.color import cicp_problem
 from ..io.samples import to_float
-from ..limits import DEFAULT_LIMITS
+from ..limits import DEFAULT_LIMITS, enough_memory
 from ..model import Layer, Layers, Picture
 from ..texture.implicit import ImplicitTexture
 from ..texture.network import Floats, NetShape, Network
@@ -47,6 +47,7 @@ class Progress(Protocol):
         """
 
 
+@enough_memory("to encode the picture; make it smaller, or encode it in parts")
 def encode(
     pixels: NDArray[Any],
     settings: Settings | None = None,
@@ -80,7 +81,8 @@ def encode(
         UsageError: A setting or metadata block is invalid, or a target size or PSNR is out of
             reach.
         UnsupportedError: A package that is needed is not installed.
-        LimitError: The picture is larger than readers accept by default.
+        LimitError: The picture is larger than readers accept by default, or needs more memory than
+            there is.
     """
     settings = _with_options(settings or Settings(), options)
     report = progress or (lambda stage, done, total: None)

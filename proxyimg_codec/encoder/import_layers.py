@@ -18,9 +18,9 @@ from .. import plugins
 from ..errors import InputError
 from ..geometry.pose import OPACITY_MAX, Pose
 from ..io.samples import to_float
-from ..limits import DEFAULT_LIMITS
+from ..limits import DEFAULT_LIMITS, enough_memory
 from ..model import Layer, Layers, Picture
-from ..texture.implicit import ImplicitTexture
+from ..texture.implicit import Box, ImplicitTexture
 from ..texture.network import Floats, NetShape, Network
 from .encode import Progress, check_blocks, fit_image
 from .implicit.fit_problem import Problem, build_apart
@@ -40,8 +40,11 @@ SURE = 0.5
 def encode_layers(
     picture: LayeredPicture, settings: Settings | None = None, progress: Progress | None = None
 ) -> tuple[Any, LayeredPicture]:
-    """Encodes a layered picture with implicit textures, layer by layer.
+    """Encodes a layered picture, layer by layer.
 
+    Each layer has all its pixels. As a pyramid it has planes of its own; of implicit textures, all
+    opaque layers share one network, and all others another one. Texture ``auto`` is implicit if
+    another setting needs it, or if the layers have more samples than readers accept by default.
     Opacity, visibility and groups of the layers are kept, and so are the metadata blocks.
 
     Args:
@@ -55,19 +58,22 @@ def encode_layers(
 
     Raises:
         InputError: No layer is left, or a mesher fails.
-        UsageError: A metadata block is invalid, or there is no such mesher.
+        UsageError: A metadata block is invalid, there is no such mesher, or a target size or PSNR
+            is out of reach.
         UnsupportedError: A package that is needed is not installed.
-        LimitError: The canvas is larger than readers accept by default.
+        LimitError: The canvas is larger than readers accept by default, or needs more memory than
+            there is.
     """
     found, kept = encode_layered(picture, settings, progress)
     return plugins.find("handles", "image")(found), kept
 
 
+@enough_memory("to encode the picture; make it smaller, or encode it in parts")
 def encode_layered(
     picture: LayeredPicture, settings: Settings | None = None, progress: Progress | None = None
 ) -> tuple[Picture, LayeredPicture]:
     """Encodes a layered picture as `encode_layers` does, and returns it as data."""
-    settings = settings or Settings()
+    settings = _settled(settings or Settings(), picture)
     report = progress or (lambda stage, done, total: None)
     DEFAULT_LIMITS.check("side", max(picture.width, picture.height))
     check_blocks(picture.blocks)
@@ -77,16 +83,28 @@ def encode_layered(
     visible[..., :3] *= visible[..., 3:]
     whole = Plan(tuple(p.layers[0] for p in plans), 4, False)
     meshed = with_meshes(visible, whole, settings).layers
+    covered = plans[0].opaque and not sources[0].hidden and sources[0].opacity == 1
+    channels = [plan.channels for plan in plans]
+    if settings.pyramid:
+        return _stacked(picture, meshed, channels, covered, settings, report), picture
     # Opaque layers have a network of their own without alpha, so that they stay exactly opaque.
     parts = []
-    for channels in (3, 4):
-        which = [k for k, plan in enumerate(plans) if plan.channels == channels]
+    for kind in (3, 4):
+        which = [k for k, own in enumerate(channels) if own == kind]
         if which:
             some = replace(picture, layers=tuple(sources[k] for k in which))
-            plan = Plan(tuple(meshed[k] for k in which), channels, False)
+            plan = Plan(tuple(meshed[k] for k in which), kind, False)
             parts.append(_fitted(some, plan, settings, report))
-    covered = plans[0].opaque and not sources[0].hidden and sources[0].opacity == 1
     return _merged(parts, picture, covered), picture
+
+
+def _settled(settings: Settings, picture: LayeredPicture) -> Settings:
+    """Settles which coder the texture ``auto`` stands for."""
+    if settings.texture != "auto" or not settings.pyramid or settings.target:
+        return settings
+    samples = 2 * sum(math.prod(source.pixels.shape[:2]) for source in picture.layers)
+    few = samples <= DEFAULT_LIMITS.samples or settings.tune != "mse"
+    return replace(settings, texture="pyramid" if few else "implicit")
 
 
 def _planned(
@@ -107,6 +125,27 @@ def _planned(
     if not sources:
         raise InputError("all layers are empty, or too faint to be seen")
     return replace(picture, layers=tuple(sources), left_out=tuple(left_out)), plans
+
+
+def _stacked(
+    picture: LayeredPicture, plans: Sequence[LayerPlan], channels: Sequence[int], covered: bool,
+    settings: Settings, report: Progress,
+) -> Picture:  # fmt: skip
+    """Encodes layers with pyramid textures."""
+    from .pyramid.stack import encode_stack
+
+    def pixels_of(number: int, box: Box) -> Floats:
+        pixels = _on_canvas(picture.layers[number], box)
+        alpha = pixels[..., 3].copy()
+        cleaned = _clean(pixels, channels[number] == 4)
+        cleaned[..., 3] = alpha
+        return cleaned
+
+    def finished(found: Picture) -> Picture:
+        return _merged([found], picture, covered)
+
+    pairs = list(zip(plans, channels, strict=True))
+    return encode_stack(pairs, pixels_of, finished, composite(picture), settings, report)
 
 
 def _fitted(
@@ -132,7 +171,7 @@ def _merged(parts: Sequence[Picture], picture: LayeredPicture, opaque: bool) -> 
     """Merges encoded parts into one picture.
 
     Args:
-        parts: Pictures with one network each; every layer of `picture` is in one of them.
+        parts: Pictures with at most one network each; every layer of `picture` is in one of them.
         picture: The source, for order, poses and groups of the layers.
         opaque: Whether the back layer covers the canvas.
     """
@@ -165,7 +204,7 @@ def _merged(parts: Sequence[Picture], picture: LayeredPicture, opaque: bool) -> 
         layers=Layers(layers),
         networks=tuple(networks),
         blocks=dict(picture.blocks),
-        info={**(parts[0].info or {}), "areas": _areas(picture)},
+        info=parts[0].info and {**parts[0].info, "areas": _areas(picture)},
         groups={name: paths.get(path[:-1]) for path, name in paths.items()},
     )
 
@@ -225,7 +264,9 @@ def _on_canvas(layer: SourceLayer, region: tuple[int, int, int, int]) -> Floats:
     canvas = np.zeros((height, width, 4), np.float32)
     source = to_float(layer.pixels)[0]
     row, column = layer.y - y, layer.x - x
-    canvas[row : row + source.shape[0], column : column + source.shape[1]] = source
+    top, left = max(row, 0), max(column, 0)
+    seen = source[top - row : height - row, left - column : width - column]
+    canvas[top : top + seen.shape[0], left : left + seen.shape[1]] = seen
     return canvas
 
 

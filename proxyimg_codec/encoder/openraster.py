@@ -63,7 +63,8 @@ class LayeredPicture:
         height: Height of the canvas in pixels.
         layers: Layers that are not empty, back to front.
         blocks: Metadata blocks; `read_openraster` gives ``icc`` and ``cicp``, if there are such.
-        left_out: Names of the layers without visible pixels.
+        left_out: Names of the layers without visible pixels, and of hidden layers and groups that
+            cannot be imported.
     """
 
     width: int
@@ -91,8 +92,8 @@ def read_openraster(data: bytes, name: str, limits: Limits = DEFAULT_LIMITS) -> 
 
     Raises:
         InputError: The file is not OpenRaster or damaged, or no layer has a visible pixel.
-        UnsupportedError: The file has layers that are not PNG, or a blend mode other than
-            source-over.
+        UnsupportedError: The file has layers that are not PNG, or what can be seen of it has a
+            blend mode other than source-over or is no layer.
         LimitError: The file exceeds `limits`.
     """
     try:
@@ -117,6 +118,9 @@ def read_openraster(data: bytes, name: str, limits: Limits = DEFAULT_LIMITS) -> 
     blocks: dict[str, bytes] | None = None
     pixels = 0
     for unique, (layer, source) in zip(names, found, strict=True):
+        if source is None:
+            left_out.append(unique)
+            continue
         where = f"{name}: layer {unique!r}"
         png = _entry(archive, source, where, limits.file_bytes)
         pixels += _png_pixels(png, where, limits)
@@ -163,7 +167,7 @@ def _entry(archive: zipfile.ZipFile, path: str, where: str, most: int) -> bytes:
 
 def _walk(
     elements: Sequence[Element], around: SourceLayer, name: str
-) -> Iterator[tuple[SourceLayer, str]]:
+) -> Iterator[tuple[SourceLayer, str | None]]:
     """Yields the layers of a stack, front to back, without pixels.
 
     Args:
@@ -172,20 +176,17 @@ def _walk(
         name: Name of the file in error messages.
 
     Yields:
-        A layer, with its own name that need not be unique, and the entry that holds its pixels.
+        A layer, with its own name that need not be unique, and the entry that holds its pixels;
+        None for what shows nothing and could not be imported if it did.
+
+    Raises:
+        InputError: An attribute makes no sense.
+        UnsupportedError: Something that shows is no layer, or has a blend mode.
     """
     for element in elements:
         if element.tag.startswith("{"):
             continue  # an extension, which readers may ignore
         where = f"{name}: {element.tag} {element.get('name', '')!r}"
-        if element.tag not in ("layer", "stack"):
-            raise UnsupportedError(f"{where}: only layers and stacks of them can be imported")
-        blend = element.get("composite-op", "svg:src-over")
-        if blend != "svg:src-over":
-            raise UnsupportedError(
-                f"{where}: composite-op {blend!r} is not supported, only svg:src-over; set the "
-                "blending mode to normal, or merge the layer with those below it"
-            )
         placed = replace(
             around,
             name=element.get("name", ""),
@@ -194,7 +195,12 @@ def _walk(
             opacity=around.opacity * _opacity(element, where),
             hidden=around.hidden or element.get("visibility", "visible") == "hidden",
         )
-        if element.tag == "stack":
+        problem = _unsupported(element)
+        if problem and not (placed.hidden or placed.opacity == 0):
+            raise UnsupportedError(f"{where}: {problem}")
+        if problem:
+            yield placed, None
+        elif element.tag == "stack":
             groups = (*around.groups, _printable(placed.name) or "group")
             yield from _walk(list(element), replace(placed, groups=groups), name)
         else:
@@ -202,6 +208,19 @@ def _walk(
             if source is None:
                 raise InputError(f"{where}: has no src, so no pixels")
             yield placed, source
+
+
+def _unsupported(element: Element) -> str:
+    """Returns why an element of a stack cannot be imported; nothing if it can."""
+    if element.tag not in ("layer", "stack"):
+        return "only layers and stacks of them can be imported"
+    blend = element.get("composite-op", "svg:src-over")
+    if blend == "svg:src-over":
+        return ""
+    return (
+        f"composite-op {blend!r} is not supported, only svg:src-over; set the blending mode to "
+        "normal, merge the layer with those below it, or hide it"
+    )
 
 
 def _integer(element: Element, key: str, where: str, default: str = "") -> int:

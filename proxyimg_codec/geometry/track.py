@@ -93,8 +93,12 @@ class Timeline:
         Raises:
             UsageError: The time is not a finite number.
         """
-        if not math.isfinite(seconds * MICROSECONDS):
-            raise UsageError(f"t = {seconds} is not a time in seconds")
+        try:
+            good = math.isfinite(seconds) and math.isfinite(seconds * MICROSECONDS)
+        except (TypeError, OverflowError):
+            good = False
+        if not good:
+            raise UsageError(f"t = {seconds!r} is not a time in seconds")
         end = self.duration * 1000
         at = round(seconds * MICROSECONDS)
         at = at % end if self.loop else min(max(at, 0), end)

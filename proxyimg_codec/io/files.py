@@ -7,11 +7,13 @@ import errno
 import os
 import secrets
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import BinaryIO, TextIO
 
-from ..errors import InputError
+from ..errors import InputError, PxiError
 
 
 def read_bytes(path: str | os.PathLike[str]) -> bytes:
@@ -30,6 +32,23 @@ def read_bytes(path: str | os.PathLike[str]) -> bytes:
 
 def _name(path: str | os.PathLike[str], kind: str) -> str:
     return f"standard {kind}" if os.fspath(path) == "-" else os.fspath(path)
+
+
+@contextmanager
+def naming(path: str | os.PathLike[str], kind: type[PxiError] = PxiError) -> Iterator[None]:
+    """Context in which errors about the content of an input begin with its name.
+
+    Args:
+        path: Path of the file; ``-`` is standard input.
+        kind: Class of the errors that are about the content.
+    """
+    place = f"{_name(path, 'input')}: "
+    try:
+        yield
+    except kind as error:
+        if not str(error).startswith(place):
+            error.args = (f"{place}{error}",)
+        raise
 
 
 def _standard(stream: TextIO | None) -> BinaryIO:

@@ -14,8 +14,11 @@ import ctypes as ct
 import functools
 import importlib.machinery
 import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,9 +112,47 @@ def _loaded(path: Path) -> ct.CDLL | None:
     return lib
 
 
+_allowed = ContextVar("_allowed", default=True)
+
+
+@contextmanager
+def for_engine(engine: str) -> Iterator[None]:
+    """Context of work for an engine: within it ``numpy`` does without the kernel everywhere."""
+    token = _allowed.set(_allowed.get() and engine != "numpy")
+    try:
+        yield
+    finally:
+        _allowed.reset(token)
+
+
 def available() -> bool:
-    """Whether the compiled kernel can be used."""
-    return library() is not None
+    """Whether the compiled kernel can be used, and the engine in use allows it."""
+    return _allowed.get() and library() is not None
+
+
+Made = TypeVar("Made")
+
+
+class Computed(Generic[Made]):
+    """Property that is computed when it is first needed: once with the kernel, once without.
+
+    Args:
+        make: Function that computes the value from its object.
+    """
+
+    def __init__(self, make: Callable[[Any], Made]) -> None:
+        self._make = make
+        self.__doc__ = make.__doc__
+
+    def __get__(self, instance: Any, owner: Any = None) -> Made:
+        if instance is None:
+            return self  # type: ignore[return-value]  # for documentation only
+        key = f"{self._make.__name__} of {'the kernel' if available() else 'numpy'}"
+        values = instance.__dict__
+        if key not in values:
+            values[key] = self._make(instance)
+        found: Made = values[key]
+        return found
 
 
 def pointer(array: NDArray[Any]) -> int:

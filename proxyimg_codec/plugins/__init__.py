@@ -17,10 +17,10 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from ..errors import UsageError
+from ..errors import UnsupportedError, UsageError
 
 if TYPE_CHECKING:
-    from importlib.metadata import EntryPoints
+    from importlib.metadata import EntryPoint, EntryPoints
 
 BUILT_IN = {
     "segmenters": {"regions": "proxyimg_codec.encoder.shapes.segment:segment"},
@@ -54,12 +54,33 @@ def find(kind: str, name: str) -> Any:
 
     Raises:
         UsageError: There is no such plug-in.
-        ImportError: A package that the plug-in needs is not installed.
+        UnsupportedError: A package that the plug-in needs is not installed, or the package that
+            offers it does not have it.
     """
     if name in BUILT_IN[kind]:
         module, _, attribute = BUILT_IN[kind][name].partition(":")
-        return getattr(importlib.import_module(module), attribute)
+        try:
+            return getattr(importlib.import_module(module), attribute)
+        except ModuleNotFoundError as error:
+            raise UnsupportedError(
+                f"{kind}: {name} needs {error.name}: pip install 'proxyimg-codec[all]'"
+            ) from None
     for entry in _added(kind):
         if entry.name == name:
-            return entry.load()
+            return _loaded(kind, entry)
     raise UsageError(f"{kind}: {name!r} is unknown; there are {', '.join(names(kind))}")
+
+
+def _loaded(kind: str, entry: EntryPoint) -> Any:
+    """Loads a plug-in of another package."""
+    package = entry.dist.name if entry.dist else entry.module.partition(".")[0]
+    try:
+        return entry.load()
+    except ModuleNotFoundError as error:
+        problem = f"needs {error.name}, which is not installed"
+    except (ImportError, AttributeError) as error:
+        problem = f"cannot be loaded ({error})"
+    raise UnsupportedError(
+        f"{kind}: {entry.name!r} of package {package} {problem}; install what is missing, or "
+        f"another version of {package}"
+    )

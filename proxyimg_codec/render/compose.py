@@ -56,7 +56,7 @@ def compose(
 
     Raises:
         UsageError: The engine is unknown.
-        UnsupportedError: The engine is not installed.
+        UnsupportedError: The engine, or a package that it needs, is not installed.
         LimitError: The work would exceed `limits`.
         FormatError: A coded stream that is decoded only now is corrupt.
     """

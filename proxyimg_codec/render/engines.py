@@ -73,13 +73,13 @@ def find(name: str) -> Engine:
 
     Raises:
         UsageError: There is no engine of that name.
-        UnsupportedError: The engine is not installed.
+        UnsupportedError: The engine, or a package that it needs, is not installed.
     """
     if name == "auto":
         name = "native" if kernel.available() else "numpy"
     if name == "native" and not kernel.available():
         raise UnsupportedError("engine native: the kernel was not compiled at installation")
-    if name in BUILT_IN:
+    if isinstance(name, str) and name in BUILT_IN:
         return BUILT_IN[name]
     known = [*BUILT_IN, *plugins.names("engines")]
     if name not in known:

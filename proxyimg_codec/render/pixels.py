@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UsageError
-from ..limits import DEFAULT_LIMITS, Limits
+from ..limits import DEFAULT_LIMITS, Limits, enough_memory
 from ..model import Layer, Pictured
+from ..native import kernel
 from .cache import Cache
 from .compose import compose
 from .moment import at
@@ -45,7 +48,8 @@ def render(
         layers: Names or positions of the layers to draw; by default all that are not hidden.
         background: Whether to draw the back layer of an opaque picture.
         dtype: uint8 or uint16 (rounded), or float32 in 0..1.
-        engine: ``auto``, ``numpy``, ``native`` or ``ort``.
+        engine: ``auto``, ``numpy``, ``native`` or ``ort``; ``numpy`` does without the compiled
+            kernel, also for what is decoded only now.
         limits: Bounds on the size of the output and on the work it may take.
         progress: Called after each tile with the number of its pixels.
         cache: Colours computed before; this call adds to them.
@@ -55,10 +59,11 @@ def render(
         drawn, otherwise [height, width, 4] with straight alpha.
 
     Raises:
-        UsageError: The arguments contradict each other or are out of range, a layer is unknown, or
-            `t` is given for a picture without a timeline.
-        UnsupportedError: The engine is not installed.
-        LimitError: The output is too large, or takes too much work.
+        UsageError: An argument has a wrong type or is out of range, arguments contradict each
+            other, the layer or engine is unknown, no layer is left, or `t` is given for a picture
+            without a timeline.
+        UnsupportedError: The engine, or a package that it needs, is not installed.
+        LimitError: The output is too large, takes too much work, or more memory than there is.
         FormatError: A coded stream that is decoded only now is corrupt.
     """
     picture = image.picture if t is None else at(image.picture, t)
@@ -67,16 +72,26 @@ def render(
     view = make_view(picture.size, width, height, scale, region)
     limits.check("output_pixels", view.width * view.height)
     solid = picture.opaque and bool(chosen) and chosen[0] is picture.layers[0]
-    result = np.empty((view.height, view.width, 3 if solid else 4), kind)
-
-    def put(row: int, column: int, tile: NDArray[np.float32]) -> None:
-        h, w = tile.shape[:2]
-        result[row : row + h, column : column + w] = _finished(tile, solid, kind)
-        if progress:
-            progress(h * w)
-
-    compose(picture, view, chosen, engine, put, limits, cache)
+    with kernel.for_engine(engine), enough_memory("to draw the picture; ask for a smaller one"):
+        result = np.empty((view.height, view.width, 3 if solid else 4), kind)
+        put = partial(_put, result, progress)
+        compose(picture, view, chosen, engine, put, limits, cache)
     return result
+
+
+def _put(
+    result: NDArray[Any],
+    progress: Callable[[int], None] | None,
+    row: int,
+    column: int,
+    tile: NDArray[np.float32],
+) -> None:
+    """Puts a finished tile, premultiplied [h, w, 4], in its place in the result."""
+    h, w = tile.shape[:2]
+    finished = _finished(tile, result.shape[2] == 3, result.dtype)
+    result[row : row + h, column : column + w] = finished
+    if progress:
+        progress(h * w)
 
 
 def _sample_type(dtype: Any) -> np.dtype[Any]:
@@ -104,7 +119,7 @@ def selected(image: Pictured, layers: Sequence[str | int] | None, background: bo
     if layers is None:
         wanted = [layer for layer in picture.layers if not layer.pose.hidden]
     else:
-        wanted = [picture.layers[k] for k in layers]
+        wanted = [picture.layers[k] for k in _keys(layers)]
     chosen = [
         layer
         for i, layer in enumerate(picture.layers)
@@ -113,6 +128,15 @@ def selected(image: Pictured, layers: Sequence[str | int] | None, background: bo
     if not chosen and (layers is not None or not background):
         raise UsageError("no layer is left to draw")
     return chosen
+
+
+def _keys(layers: Sequence[str | int]) -> list[str | int]:
+    try:
+        if not isinstance(layers, str):
+            return [k if isinstance(k, str) else operator.index(k) for k in layers]
+    except TypeError:
+        pass
+    raise UsageError(f"layers {layers!r} is not a list of names and positions of layers")
 
 
 def _finished(tile: NDArray[np.float32], solid: bool, dtype: np.dtype[Any]) -> NDArray[Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import operator
 from dataclasses import dataclass
 from fractions import Fraction
@@ -90,7 +91,7 @@ def make_view(
         LimitError: The output would have more than `SIDE_MAX` columns or rows.
     """
     try:
-        x, y, w, h = map(operator.index, region or (0, 0, *canvas))
+        x, y, w, h = map(operator.index, (0, 0, *canvas) if region is None else region)
         width, height = _whole(width), _whole(height)
     except (TypeError, ValueError):
         raise UsageError(
@@ -119,8 +120,12 @@ def _whole(number: int | None) -> int | None:
 
 def _scaled(scale: float, region: tuple[int, int]) -> tuple[int, int]:
     """Output columns and rows of a region of this width and height, at least 1 each."""
-    if not (np.isfinite(scale) and scale > 0):
-        raise UsageError(f"scale {scale} is not a positive number")
+    try:
+        good = math.isfinite(scale) and scale > 0
+    except (TypeError, OverflowError):
+        good = False
+    if not good:
+        raise UsageError(f"scale {scale!r} is not a positive number")
     if scale * max(region) > SIDE_MAX:
         raise LimitError(f"scale {scale:g} makes a picture of more than {SIDE_MAX} pixels a side")
     width, height = (max(round(n * scale), 1) for n in region)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..entropy import laplace, rans
-from ..errors import FormatError
+from ..errors import FormatError, LimitError
 from ..native import kernel
 from . import context
 from .context import Ints, LevelCoder
@@ -110,7 +110,7 @@ def decode(at: Place, stream: rans.Decoder, escapes: bytes, used: int) -> tuple[
     Raises:
         FormatError: The stream or the list of escapes is too short or corrupt, or a latent is out
             of range.
-        MemoryError: The kernel cannot allocate what it needs.
+        LimitError: The kernel cannot allocate what it needs.
     """
     words, states = stream.words.astype(np.uint16), stream.states.astype(np.uint32)
     listed = np.frombuffer(escapes, np.uint8)
@@ -136,7 +136,7 @@ def encode(at: Place, values: Ints, stream: rans.Encoder) -> tuple[Ints, NDArray
         int32 [9, h, w] latents as a decoder finds them, and int64 [N] differences that escape.
 
     Raises:
-        MemoryError: The kernel cannot allocate what it needs.
+        LimitError: The kernel cannot allocate what it needs.
     """
     h, w = at.bands.shape
     most = 9 * int(np.count_nonzero(at.bands))
@@ -190,5 +190,5 @@ def _run(at: Place, values: Ints | None, source: _Source, sink: _Sink) -> tuple[
     if wrong == OUT_OF_RANGE:
         raise FormatError(context.BAD_LATENT, rule="PYR-12")
     if wrong:
-        raise MemoryError("not enough memory to code a pyramid")
+        raise LimitError("there is not enough memory to code a pyramid")
     return level, latents

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..entropy import arrays, laplace
 from ..errors import FormatError
+from ..native import kernel
 from . import context, registered_model, synthesis
 from .context import Ints
 from .grid import Grid
@@ -66,7 +67,7 @@ class Planes:
         """
         return decode(self.packed, self.support, self.where)
 
-    @cached_property
+    @kernel.Computed
     def raster(self) -> Floats:
         """Decoded raster, float32 [rows, columns, components] in 0..1.
 

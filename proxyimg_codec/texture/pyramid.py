@@ -141,7 +141,7 @@ class PyramidTexture:
         """Samples of the part that show when neighbours moved, bool [height, width]; None = all."""
         return self.shown if self.cuts is None or moved == ALL_IN_PLACE else self.cuts.kept(moved)
 
-    @cached_property
+    @kernel.Computed
     def filled(self) -> NDArray[np.uint16]:
         """Samples of the part, filled by diffusion from the trusted ones.
 
@@ -228,7 +228,7 @@ class PyramidTexture:
             self._last[moved] = found
         return found
 
-    @cached_property
+    @kernel.Computed
     def _last(self) -> dict[Moved, Floats]:
         return {}
 

@@ -9,6 +9,7 @@ import ctypes as ct
 
 import numpy as np
 
+from ..errors import LimitError
 from ..native import kernel
 from .context import Ints
 from .network import Floats
@@ -48,7 +49,7 @@ def finer(
         float32 [rows, columns, 3] planes.
 
     Raises:
-        MemoryError: The kernel cannot allocate what it needs.
+        LimitError: The kernel cannot allocate what it needs.
     """
     lib = kernel.library()
     assert lib is not None, "check available() first"
@@ -63,5 +64,5 @@ def finer(
         *map(kernel.pointer, (low, latents, out)),
     )  # fmt: skip
     if lib.pxi_pyramid_synthesis(ct.byref(level)):
-        raise MemoryError("not enough memory to decode a pyramid")
+        raise LimitError("there is not enough memory to decode a pyramid")
     return out

@@ -114,7 +114,8 @@ def test_number_of_layers(encode):
     assert [v["segments"] for v in info(encode("--layers", "1"))["layers"]] == [0]
 
 
-def test_boundary_method(encode, monkeypatch, tmp_path, photo):
+@pytest.mark.parametrize("texture", ["implicit", "pyramid"])
+def test_boundary_method(texture, encode, monkeypatch, tmp_path, photo):
     pytest.importorskip("torch")
     chamfer = pytest.importorskip("proxyimg_codec.encoder.shapes.chamfer")
     slow = chamfer.fit_paths_chamfer
@@ -123,11 +124,11 @@ def test_boundary_method(encode, monkeypatch, tmp_path, photo):
     )
     masks = save_masks(tmp_path / "masks", object=photo[..., 0] == 220)
     facts = [
-        info(encode("--texture", "implicit", "--masks", masks, "--boundary", b))
+        info(encode("--texture", texture, "--masks", masks, "--boundary", b))
         for b in ("lsq", "chamfer")
     ]
-    # What is usual is not recorded.
-    assert [f["settings"].get("boundary") for f in facts] == [None, "chamfer"]
+    if texture == "implicit":  # what is usual is not recorded
+        assert [f["settings"].get("boundary") for f in facts] == [None, "chamfer"]
     assert facts[0]["chunk_bytes"]["LAYR"] != facts[1]["chunk_bytes"]["LAYR"]
 
 

@@ -161,3 +161,18 @@ def test_motion_is_told(tool, moving_pxi, small_pxi):
     assert "motion: 'bar', 'disc' for 1.5 s, in a loop, made for 8 frames a second" in text
     assert json.loads(tool("info", small_pxi, "--json").out)["motion"] is None
     assert "motion" not in tool("info", small_pxi).out.decode()
+
+
+@pytest.mark.parametrize("content", [b"", b"hello world", "cut", "limited"])
+@pytest.mark.parametrize("name", ["a b.pxi", "-"])
+def test_errors_name_the_file(content, name, tool, small_pxi, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    whole = small_pxi.read_bytes()
+    data = {"cut": whole[:-30], "limited": whole}.get(content, content)
+    (tmp_path / "a b.pxi").write_bytes(data)
+    flags = ["--limit", "layers=2"] if content == "limited" else []
+    code = 6 if flags else 4
+    err = tool("info", name, *flags, code=code, stdin=data).err
+    place = "standard input" if name == "-" else name
+    assert err.startswith(f"pxi-info: {place}: ")
+    assert err.count(place) == 1

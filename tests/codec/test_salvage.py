@@ -234,13 +234,37 @@ def test_the_tool(tool, launch, flat, tmp_path):
     cut.write_bytes(flat[: place(flat)[1] - 9])
     bad.write_bytes(flat[:60])
     assert tool("decode", "--tolerant", whole, "-f", "--quiet").err == ""
-    tool("decode", cut, code=4)
+    err = tool("decode", cut, code=4).err
+    assert err.startswith(f"pxi-decode: {cut}: chunk ")
+    assert err.endswith("; --tolerant decodes as much as is left\n")
     assert not (tmp_path / "cut.png").exists()
     ran = tool("decode", "--tolerant", cut, "--quiet", code=DAMAGED)
     assert ran.err.startswith("pxi-decode: warning: ")
     assert "chunk PLAN 0: levels used, coarsest first: 2 of 3" in ran.err
     assert (tmp_path / "cut.png").exists()
     assert launch("decode", "--tolerant", cut, "-f", "--quiet", code=7).err == ran.err
-    tool("decode", "--tolerant", bad, code=4)
+    assert "--tolerant" not in tool("decode", "--tolerant", bad, code=4).err
+    bad.write_bytes(flat[:5])
+    assert "--tolerant" not in tool("decode", bad, code=4).err
     help_ = tool("decode", "--help").out.decode()
     assert f"  {DAMAGED} damaged" in help_
+
+
+def test_damage_that_is_found_while_drawing_is_named_too(tool, flat, tmp_path):
+    """The stream of latents is decoded only when something is drawn."""
+    chunks = [
+        Chunk("PLAN", spoilt(chunk.payload)) if chunk.type == "PLAN" else chunk
+        for chunk in read(flat)
+    ]
+    path = tmp_path / "spoilt.pxi"
+    path.write_bytes(write(chunks))
+    pxi.open(path)
+    err = tool("decode", path, code=4).err
+    assert err.startswith(f"pxi-decode: {path}: ")
+    assert err.count(str(path)) == 1
+    assert err.endswith("; --tolerant decodes as much as is left\n")
+
+
+def spoilt(payload: bytes) -> bytes:
+    """PLAN whose stream of latents has other bytes."""
+    return payload[:-40] + bytes(v ^ 0x5A for v in payload[-40:])

@@ -1,7 +1,9 @@
 """The runner runs commands, lists cases, and refuses senseless options."""
 
 import json
+import os
 import shlex
+import subprocess
 import sys
 from pathlib import Path
 
@@ -11,6 +13,7 @@ from conformance import judge, runner
 from conformance.cases import LEVELS, PROFILES
 from conformance.processes import command_decoder, expand
 from tests.conformance.decoders import BY_NAME, CASES, command
+from tests.support.paths import ROOT
 
 
 def test_wrong_latents_are_caught_as_a_command(capsys, at_root):
@@ -109,3 +112,23 @@ def test_commands_are_expanded():
 def test_the_runner_refuses_senseless_options(options, capsys):
     with pytest.raises(SystemExit, match="2"):
         runner.main(options)
+
+
+@pytest.mark.parametrize(
+    "program",
+    [
+        ["conformance.runner", "--list"],
+        ["conformance.runner", "--only", "pixel"],
+        ["spec.dump", str(ROOT / "spec" / "example.pxi")],
+    ],
+    ids=" ".join,
+)
+def test_output_that_nobody_reads_is_dropped(program, at_root):
+    """As ``| head -0`` does: the reader is gone before the first line."""
+    read, write = os.pipe()
+    os.close(read)
+    command_line = [sys.executable, "-m", *program]
+    ran = subprocess.run(command_line, stdout=write, stderr=subprocess.PIPE, text=True)
+    os.close(write)
+    assert ran.stderr == ""
+    assert ran.returncode == 3

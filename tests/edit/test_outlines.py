@@ -138,6 +138,63 @@ def test_transforms_of_groups_and_shapes(image):
     assert got[0][::3] == [[5, 3], [5, 15], [17, 15]]
 
 
+TRIANGLE = np.array([[0, 0], [6, 0], [6, -6]])
+
+
+def turned(degrees: float, about=(0, 0)) -> np.ndarray:
+    """A rotation, float64 [2, 3]."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    turn = np.array([[c, -s], [s, c]])
+    return np.column_stack([turn, about - turn @ about])
+
+
+@pytest.mark.parametrize(
+    ("attributes", "expected"),
+    [
+        ('style="transform: translate(20px, 15px)"', [[1, 0, 20], [0, 1, 15]]),
+        ('style="fill:red; TRANSFORM : translateX(1in) ;opacity:1"', [[1, 0, 96], [0, 1, 0]]),
+        ('style="transform:translate(3mm)"', [[1, 0, 3 * 96 / 25.4], [0, 1, 0]]),
+        ('style="transform:rotate(.25turn)"', turned(90)),
+        ('style="transform:rotate(0.5rad) scale(2,3)"', turned(np.degrees(0.5)) * [2, 3, 1]),
+        ('style="transform:rotate(30deg);transform-origin:8px 5px"', turned(30, (8, 5))),
+        ('transform="rotate(-40)" transform-origin="7 3"', turned(-40, (7, 3))),
+        ('transform="rotate(-40 7,3)"', turned(-40, (7, 3))),
+        ('transform="scale(2)" style="transform-origin:10px 0"', [[2, 0, -10], [0, 2, 0]]),
+        ('transform="translate(50 50)" style="transform:scaleY(2)"', [[1, 0, 0], [0, 2, 0]]),
+        ('transform="scale(9)" style="transform:none"', [[1, 0, 0], [0, 1, 0]]),
+        ('style="transform:/* half a turn */ rotate(180deg) !important"', turned(180)),
+        ('style="transform:matrix(1,2,3,4,5,6);transform-box:view-box"', [[1, 3, 5], [2, 4, 6]]),
+        ('style="transform-origin:center"', [[1, 0, 0], [0, 1, 0]]),
+        ('style="display:none;opacity:.5;stroke:red"', [[1, 0, 0], [0, 1, 0]]),
+    ],
+)
+def test_transforms_in_styles_are_applied(image, attributes, expected):
+    matrix = np.array(expected, np.float64)
+    wanted = TRIANGLE @ matrix[:, :2].T + matrix[:, 2]
+    shape = '<path id="disc" {} d="M0 0H6V-6z"/>'
+    for data in (one(shape.format(attributes)), one(f"<g {attributes}>{shape.format('')}</g>")):
+        got = np.array(disc(image, data)[0])[::3]
+        np.testing.assert_allclose(got, wanted, atol=1 / 64)
+
+
+def test_nested_transforms_of_both_kinds(image):
+    inner = '<path id="disc" style="transform:scale(2)" d="M0 0H6V-6z"/>'
+    got = disc(
+        image,
+        one(f'<g style="transform:rotate(90deg)"><a transform="translate(4 9)">{inner}</a></g>'),
+    )
+    assert got[0][::3] == [[-9, 4], [-9, 16], [3, 16]]
+
+
+SHAPE = '<path id="disc" d="M8 8H16V16z"/>'
+
+
+@pytest.mark.parametrize("sheet", ["", ".a{fill:#fff;stroke-width:2}", "/* transform: none */"])
+def test_style_sheets_of_colours_do_no_harm(image, sheet):
+    data = one(f"<defs><style>{sheet}</style></defs>{SHAPE}")
+    assert disc(image, data)[0][::3] == [[8, 8], [16, 8], [16, 16]]
+
+
 @pytest.mark.parametrize(
     ("page", "d"),
     [
@@ -211,7 +268,7 @@ def refused(error: type[pxi.PxiError], image, data: bytes, *words: str, **limits
         (b'<!DOCTYPE svg [<!ENTITY a "b">]>' + one(""), ["DOCTYPE"]),
         (one("<g>" * 70 + "</g>" * 70), ["nested deeper"]),
         (one(""), ["no path"]),
-        (one('<text id="disc">disc</text>'), ["no path"]),
+        (one('<text id="label">disc</text>'), ["no path"]),
         (path("M8 8H16V16z", "cat"), ["path 'cat'", "no layer", "'back', 'bar', 'disc'"]),
         (one('<path d="M8 8H16V16z"/>'), ["path ''", "no layer"]),
         (one('<rect id="disc" width="9" height="9"/><path id="x" inkscape:label="disc"/>'),
@@ -227,7 +284,7 @@ def refused(error: type[pxi.PxiError], image, data: bytes, *words: str, **limits
         (one('<g transform="scale(1e200)"><g transform="scale(1e200)">'
              '<path id="disc" d="M 3 3 L 8 9 9 9 z"/></g></g>'), ["not a finite number"]),
         (path(f"M 3 3 L {1 << 24} 8 9 9 z"), ["layer 'disc'", "out of range"]),
-        (path("M 3 3 L 8 8 9 9 z", more='transform="matrix(1 2)"'), ["transform of path 'disc'"]),
+        (path("M 3 3 L 8 8 9 9 z", more='transform="matrix(1 2)"'), ["'disc'", "'matrix(1 2)'"]),
         (one('<rect id="back" width="60" height="48"/>'), ["layer 'back'", "stays so"]),
     ],
 )  # fmt: skip
@@ -259,10 +316,74 @@ def test_pages_that_are_none(image, page):
         (one(f"<svg {SVG}/>"), "svg ''"),
         (path("M0 0H9V9z M2 1H8V7z", more='fill-rule="evenodd"'), "evenodd"),
         (path("M0 0H9V9z M2 1H8V7z", more='style="fill:red;fill-rule: evenodd"'), "evenodd"),
+        (one('<g fill-rule="evenodd"><path id="disc" d="M0 0H9V9zM2 1H8V7z"/></g>'), "evenodd"),
+        (one(f"<style>.a {{ transform:scale(2) }}</style>{SHAPE}"), "'transform'"),
+        (one(f"<style>#disc{{fill:red;clip-path:none}}</style>{SHAPE}"), "'clip-path'"),
+        (one(f"<defs><style>path{{d:path('M0 0')}}</style></defs>{SHAPE}"), "'d'"),
+        (one(f"<style>@import url(a.css);</style>{SHAPE}"), "@import"),
+        (b'<?xml-stylesheet href="a.css"?>' + one(SHAPE), "another file"),
+        (one(SHAPE, f'{PAGE} transform="scale(2)"'), "svg element"),
+        (one(SHAPE, f'{PAGE} style="transform:scale(2)"'), "svg element"),
+        (one(SHAPE, f'{PAGE} clip-path="url(#c)"'), "clip-path"),
+        (one(f"<switch>{SHAPE}<g/></switch>"), "switch"),
+        (one('<text id="disc">disc</text>' + SHAPE.replace("disc", "bar")), "text 'disc'"),
+        (one('<image inkscape:label="disc"/>' + SHAPE.replace("disc", "bar")), "image"),
+        (path("M8 8H16V16z")[:-8] + b"><animateTransform/></path></svg>", "animateTransform"),
     ],
 )
 def test_what_is_not_supported(image, data, word):
     refused(pxi.UnsupportedError, image, data, word)
+
+
+@pytest.mark.parametrize(
+    ("attributes", "word"),
+    [
+        ('style="transform:translate(5%,0)"', "translate(5%"),
+        ('style="transform:translate(calc(2px + 3px))"', "calc"),
+        ('style="transform:translate3d(1px,2px,0)"', "translate3d"),
+        ('style="transform:rotateY(1rad)"', "rotateY"),
+        ('style="transform:translate(2em)"', "2em"),
+        ('style="transform:scale(2);transform-origin:center"', "'center'"),
+        ('style="transform:scale(2);transform-origin:50% 50%"', "'50% 50%'"),
+        ('transform="scale(2)" transform-origin="8"', "transform-origin"),
+        ('style="transform:scale(2);transform-box:fill-box"', "transform-box"),
+        ('style="-webkit-transform:scale(2)"', "-webkit-transform"),
+        ('style="translate:3px"', "translate"),
+        ('style="rotate:3deg"', "rotate"),
+        ('style="scale:2"', "scale"),
+        ("style=\"offset-path:path('M0 0')\"", "offset-path"),
+        ('style="clip-path:url(#c)"', "clip-path"),
+        ('clip-path="url(#c)"', "clip-path"),
+        ('mask="url(#m)"', "mask"),
+        ("style=\"d:path('M0 0')\"", "'d'"),
+        ('style="cx:5px"', "'cx'"),
+    ],
+)
+def test_what_moves_or_cuts_and_cannot_be_applied(image, attributes, word):
+    shape = '<path id="disc" {} d="M8 8H16V16z"/>'
+    refused(pxi.UnsupportedError, image, one(shape.format(attributes)), "'disc'", word)
+    grouped = f'<g id="group" {attributes}>{shape.format("")}</g>'
+    refused(pxi.UnsupportedError, image, one(grouped), "'group'", word)
+
+
+@pytest.mark.parametrize(
+    "attributes",
+    ['transform="translate(5"', 'transform="bogus(3)"', 'transform="translate()"',
+     'transform="translate(1px)"', 'transform="rotate(1 2)"', 'transform="scale(2) hello"',
+     'style="transform:translate(5,3)"', 'style="transform:rotate(40)"'],
+)  # fmt: skip
+def test_malformed_transforms(image, attributes):
+    refused(pxi.InputError, image, path("M8 8H16V16z", more=attributes), "'disc'", "transform")
+
+
+def test_long_malformed_transforms_are_refused_fast(image):
+    hostile = f'transform="scale({"1" * 200_000}"'
+    refused(pxi.InputError, image, path("M8 8H16V16z", more=hostile), "transform")
+
+
+def test_pages_that_do_not_fit_their_view_box(image):
+    for page in ('width="64" height="64"', 'width="10mm" height="20mm"'):
+        refused(pxi.InputError, image, one(SHAPE, f"{PAGE} {page}"), "than the viewBox")
 
 
 def test_even_odd_without_holes_is_no_problem(image):

@@ -19,7 +19,7 @@ from proxyimg_codec.render.view import make_view
 from proxyimg_codec.texture.occlusion import ALL_IN_PLACE, ALL_REMOVED, Moved, Occlusion
 from tests.support.edits import EDITS, covered, grown, near
 from tests.support.images import changed
-from tests.support.pyramids import SIZE, cut_picture, implicit, planes, view
+from tests.support.pyramids import SIZE, cut_picture, filled, implicit, planes, view
 
 
 @pytest.fixture
@@ -347,9 +347,9 @@ def test_a_picture_at_rest_needs_no_fill(made_up_planes, region):
     raster = planes("colour").raster[y : y + h, x : x + w]
     np.testing.assert_allclose(shown, raster, atol=1e-6)
     assert all(not v.texture.shown.all() for v in image.layers)
-    assert not any("filled" in v.texture.__dict__ for v in image.layers)
+    assert not any(filled(v.texture) for v in image.layers)
     image.layers["1"].moved(3, 0).render()
-    assert "filled" in image.layers["0"].texture.__dict__
+    assert filled(image.layers["0"].texture)
 
 
 def test_equal_numbers_may_mean_different_samples(made_up_planes):

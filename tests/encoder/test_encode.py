@@ -198,3 +198,12 @@ def test_psnr_ignores_the_colour_of_invisible_pixels():
     assert psnr_8bit(a, b) is None
     b[0, 0, 3] = 255
     assert psnr_8bit(a, b) == pytest.approx(10 * np.log10(255**2 * 16 / (3 * 99**2 + 255**2)))
+
+
+def test_too_little_memory_is_a_limit(monkeypatch):
+    def fails(*_):
+        raise MemoryError
+
+    monkeypatch.setattr("proxyimg_codec.encoder.encode.plan_layers", fails)
+    with pytest.raises(pxi.LimitError, match="memory to encode"):
+        pxi.encode(np.zeros((5, 7, 3), np.uint8), effort=1)

@@ -23,7 +23,7 @@ from proxyimg_codec.io import xml
 from proxyimg_codec.io.color import to_srgb
 from proxyimg_codec.io.png import encode_png
 from proxyimg_codec.io.psnr import psnr_8bit
-from proxyimg_codec.limits import Limits
+from proxyimg_codec.limits import DEFAULT_LIMITS, Limits
 from proxyimg_codec.render.quality import psnr
 from tests.support.pictures import icc, smooth
 
@@ -220,6 +220,27 @@ def test_what_is_not_supported(stack, words):
     refused(pxi.UnsupportedError, ora(stack, a=PNG, text=b"hello", cut=PNG[:20]), *words)
 
 
+SHADE = layer("nowhere", name="shade", composite_op="svg:multiply", visibility="hidden")
+NESTED = f'<stack name="g" composite-op="svg:screen">{layer()}{layer(name="x", y="1.5")}</stack>'
+
+
+@pytest.mark.parametrize(
+    ("stack", "left_out", "kept"),
+    [
+        (SHADE, ("shade",), ["cat"]),
+        (SHADE + layer(name="shade"), ("shade 2",), ["cat", "shade"]),
+        (SHADE.replace('"hidden"', '"visible" opacity="0"'), ("shade",), ["cat"]),
+        (f'<stack visibility="hidden" name="off">{NESTED}</stack>', ("g",), ["cat"]),
+        (f'<stack opacity="0.0">{SHADE.replace("hidden", "visible")}</stack>', ("shade",), ["cat"]),
+        ('<filter name="blur" visibility="hidden"/>', ("blur",), ["cat"]),
+        (layer(name="off", visibility="hidden"), (), ["cat", "off"]),
+    ],
+)
+def test_what_is_not_supported_but_hidden_is_left_out(stack, left_out, kept):
+    picture = read(ora(stack + layer(name="cat"), a=PNG))
+    assert (picture.left_out, sorted(v.name for v in picture.layers)) == (left_out, kept)
+
+
 def test_damaged_pixels():
     refused(pxi.InputError, ora(layer(name="cat"), a=PNG[:-40]), "layer 'cat'", "damaged")
     data = ora(layer(name="cat"), a=PNG)
@@ -281,9 +302,9 @@ SCENE = stack(
 )
 
 
-@pytest.fixture(scope="module")
-def scene() -> pxi.Image:
-    image, kept = encoded(SCENE, FAST)
+@pytest.fixture(scope="module", params=["pyramid", "implicit"])
+def scene(request) -> pxi.Image:
+    image, kept = encoded(SCENE, replace(FAST, texture=request.param))
     assert kept.layers == SCENE.layers
     return pxi.from_bytes(image.to_bytes())
 
@@ -314,8 +335,12 @@ def test_every_layer_keeps_its_own_pixels_also_hidden_ones(scene):
 
 def test_soft_alpha_is_kept_and_opaque_layers_stay_opaque(scene):
     assert (scene.opaque, scene.channels) == (True, 4)
-    assert [n.shape.channels for n in scene.networks] == [3, 4]
-    assert [v.texture.network for v in scene.layers] == [0, 0, 0, 0, 1]
+    if scene.networks:
+        assert [n.shape.channels for n in scene.networks] == [3, 4]
+        assert [v.texture.network for v in scene.layers] == [0, 0, 0, 0, 1]
+    else:
+        assert [v.texture.alpha is not None for v in scene.layers] == [False] * 4 + [True]
+        assert len(scene.planes) == 6
     assert scene.layers["back"].boundary is None
     assert scene.render().shape == (H, W, 3)
     error = alone(scene, "light")[..., 3].astype(int) - SCENE.layers[-1].pixels[..., 3]
@@ -331,6 +356,9 @@ def test_opacity_visibility_and_groups_become_poses(scene):
 
 
 def test_areas_are_those_that_can_be_seen(scene):
+    if not scene.networks:  # files of pyramids record nothing about their layers
+        assert scene.info is None
+        return
     areas = scene.info["areas"]
     assert areas[3] == 0
     clear = 1 - SCENE.layers[4].pixels[..., 3] / 255
@@ -377,21 +405,24 @@ def test_layers_too_faint_to_be_found_are_left_out():
         encoded(stack(source("dust", dust)), FAST)
 
 
-def test_rims_are_clean():
+@pytest.mark.parametrize("texture", ["pyramid", "implicit"])
+def test_rims_are_clean(texture):
     """What a transparent pixel's colour is may not be seen in the rim, at any size."""
     pixels = ball(30, 24, 15)
     pixels[pixels[..., 3] < 100, :3] = 0
-    image, _ = encoded(stack(source("a", pixels)), FAST)
+    image, _ = encoded(stack(source("a", pixels)), replace(FAST, texture=texture))
     for scale in (1, 3):
-        drawn = image.render(scale=scale)
-        assert (drawn[drawn[..., 3] > 0][:, :3] == (200, 60, 40)).all()
+        drawn = image.render(scale=scale).astype(int)
+        error = np.abs(drawn[drawn[..., 3] > 0][:, :3] - (200, 60, 40))
+        assert error.max() <= (1 if texture == "pyramid" else 0)
 
 
-def test_crisp_edges_of_soft_layers():
+@pytest.mark.parametrize("texture", ["pyramid", "implicit"])
+def test_crisp_edges_of_soft_layers(texture):
     """Where outline and alpha both end, the rim is not taken off twice."""
     pixels = ball(30.3, 24, 15)
     pixels[..., 3] = pixels[..., 3] * np.clip((48 - X) / 30, 0, 1)
-    image, _ = encoded(stack(source("a", pixels)), replace(FAST, effort=3))
+    image, _ = encoded(stack(source("a", pixels)), replace(FAST, effort=3, texture=texture))
     assert image.channels == 4
     error = image.render()[..., 3].astype(int) - pixels[..., 3]
     rim = (pixels[..., 3] > 0) & (np.abs(np.hypot(X - 30.3, Y - 24) - 15) < 0.5) & (X < 20)
@@ -407,7 +438,8 @@ def test_sixteen_bits():
 
 
 def test_same_input_same_bytes(scene):
-    again, _ = encoded(SCENE, replace(FAST, jobs=2))
+    texture = "implicit" if scene.networks else "pyramid"
+    again, _ = encoded(SCENE, replace(FAST, jobs=2, texture=texture))
     assert again.to_bytes() == scene.to_bytes()
 
 
@@ -420,6 +452,74 @@ def test_there_and_back(small_pxi):
     for layer in image.layers:
         a, b = (i.render(layers=[layer.name]) for i in (image, again))
         assert psnr_8bit(a, b) > 30
+
+
+# Settings
+
+
+def rough(w: int, h: int) -> np.ndarray:
+    """Structure at all scales, uint8 [h, w, 3]."""
+    noise = np.random.default_rng(3).normal(0, 9, (h, w, 3))
+    return np.clip(smooth(w, h) + noise, 0, 255).astype(np.uint8)
+
+
+ROUGH = stack(
+    source("back", rough(W, H)), source("spot", np.dstack([rough(W, H), ball(33, 21, 17)[..., 3]]))
+)
+
+
+@pytest.mark.parametrize("texture", ["auto", "pyramid", "implicit"])
+def test_effort_and_texture_act(texture):
+    few, many = (encoded(ROUGH, replace(FAST, texture=texture, effort=e))[0] for e in (1, 3))
+    assert few.to_bytes() != many.to_bytes()
+    assert not np.array_equal(few.render(), many.render())
+    assert bool(few.networks) == (texture == "implicit")
+    rate = [8 * len(v.to_bytes()) / W / H for v in (few, many)]
+    gain = psnr(composite(ROUGH), many) - psnr(composite(ROUGH), few)
+    assert gain + 6 * (rate[0] - rate[1]) > 0  # better at the same size, at 6 dB a bit
+
+
+@pytest.mark.parametrize("given", [{"feature_bits": 5}, {"net_bits": 6}, {"sampling": "node"}])
+def test_auto_is_implicit_if_a_setting_needs_it(given):
+    image, _ = encoded(stack(source("a", smooth(17, 13))), replace(FAST, **given))
+    assert image.networks
+
+
+def test_auto_is_implicit_if_readers_would_refuse_so_many_samples(monkeypatch):
+    few = replace(DEFAULT_LIMITS, samples=2 * W * H)
+    monkeypatch.setattr("proxyimg_codec.encoder.import_layers.DEFAULT_LIMITS", few)
+    monkeypatch.setattr("proxyimg_codec.encoder.pyramid.stack.DEFAULT_LIMITS", few)
+    three = stack(*(source(name, smooth(W, H)) for name in "abc"))
+    assert encoded(stack(source("a", smooth(W, H))), FAST)[0].networks == ()
+    assert encoded(three, FAST)[0].networks
+    with pytest.raises(pxi.LimitError, match="samples"):
+        encoded(three, replace(FAST, texture="pyramid"))
+
+
+@pytest.mark.parametrize(("kind", "value"), [("psnr", 33.0), ("size", 2500.0), ("bpp", 5.5)])
+def test_targets_are_met(kind, value):
+    image, _ = encoded(ROUGH, replace(FAST, **{f"target_{kind}": value}))
+    size = len(image.to_bytes())
+    got = {"psnr": psnr(composite(ROUGH), image), "size": size, "bpp": 8 * size / W / H}[kind]
+    assert got == pytest.approx(value, rel=0.03)
+
+
+def test_tuning_acts():
+    plain, tuned = (encoded(ROUGH, replace(FAST, tune=t))[0] for t in ("mse", "ms-ssim"))
+    assert plain.to_bytes() != tuned.to_bytes()
+
+
+@pytest.mark.parametrize("size", [(1, 1), (2, 3), (7, 1), (9, 65)])
+@pytest.mark.parametrize("soft", [False, True])
+def test_layers_of_any_size(size, soft):
+    w, h = size
+    small = rough(w, h) if not soft else np.dstack([rough(w, h), np.full((h, w), 140, np.uint8)])
+    picture = LayeredPicture(70, 67, (
+        SourceLayer("back", rough(70, 67), 0, 0), SourceLayer("a", small, 61 - w // 2, 2),
+    ))  # fmt: skip
+    image, kept = encoded(picture, replace(FAST, quality=80))
+    assert psnr(composite(picture), pxi.from_bytes(image.to_bytes())) > 27
+    assert soft or not kept.left_out
 
 
 # The command

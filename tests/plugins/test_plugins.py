@@ -1,3 +1,4 @@
+import sys
 from importlib.metadata import EntryPoint
 
 import numpy as np
@@ -19,8 +20,14 @@ def left_half(rgb, max_layers, support):
 def added(monkeypatch):
     entry = EntryPoint("halves", f"{__name__}:left_half", "proxyimg_codec.segmenters")
 
+    offer(monkeypatch, entry)
+
+
+def offer(monkeypatch, entry):
+    """Makes an entry point known as if its package were installed."""
+
     def entry_points(group, name=None):
-        return [entry] if group == entry.group and name in (None, "halves") else []
+        return [entry] if group == entry.group and name in (None, entry.name) else []
 
     monkeypatch.setattr("importlib.metadata.entry_points", entry_points)
 
@@ -36,3 +43,38 @@ def test_added_segmenters_are_used(added):
 def test_unknown_names_are_refused_with_the_known_ones():
     with pytest.raises(pxi.UsageError, match="regions"):
         pxi.encode(smooth(40, 30), segmenter="magic", effort=1)
+
+
+def fails_to_import(tmp_path, monkeypatch, text):
+    (tmp_path / "elsewhere.py").write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "elsewhere", raising=False)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("import nowhere_to_be_found", "needs nowhere_to_be_found"),
+        ("from math import no_such_thing", "cannot be loaded"),
+        ("", "cannot be loaded"),
+    ],
+)
+@pytest.mark.parametrize("kind", ["engines", "segmenters", "meshers"])
+def test_a_plugin_that_cannot_be_loaded_names_its_package(kind, text, said, tmp_path, monkeypatch):
+    fails_to_import(tmp_path, monkeypatch, text)
+    offer(monkeypatch, EntryPoint("mine", "elsewhere:run", f"proxyimg_codec.{kind}"))
+    with pytest.raises(pxi.UnsupportedError, match=f"{kind}: 'mine' of package elsewhere {said}"):
+        plugins.find(kind, "mine")
+
+
+def test_rendering_says_so_too(small_pxi, tmp_path, monkeypatch):
+    fails_to_import(tmp_path, monkeypatch, "import nowhere_to_be_found")
+    offer(monkeypatch, EntryPoint("mine", "elsewhere:run", "proxyimg_codec.engines"))
+    with pytest.raises(pxi.UnsupportedError, match="nowhere_to_be_found"):
+        pxi.open(small_pxi).render(engine="mine")
+
+
+def test_built_in_plugins_name_what_is_missing(monkeypatch):
+    monkeypatch.setitem(plugins.BUILT_IN, "engines", {"far": "nowhere_to_be_found.at:all"})
+    with pytest.raises(pxi.UnsupportedError, match="engines: far needs nowhere_to_be_found"):
+        plugins.find("engines", "far")

@@ -11,7 +11,7 @@ from proxyimg_codec.model import Layers
 from proxyimg_codec.render import compose
 from proxyimg_codec.texture.planes import Planes
 from tests.support.images import changed
-from tests.support.pyramids import SIZE, picture, planes, view
+from tests.support.pyramids import SIZE, filled, picture, planes, view
 from tests.support.textures import ENGINES
 
 
@@ -21,7 +21,7 @@ def test_at_rest_the_picture_is_the_raster(pyramid):
     out = pyramid.render(dtype=np.float32)
     np.testing.assert_allclose(out, expected, atol=1e-6)
     assert pyramid.networks == ()
-    assert not any("filled" in v.texture.__dict__ for v in pyramid.layers)
+    assert not any(filled(v.texture) for v in pyramid.layers)
 
 
 def test_what_was_hidden_is_smooth(pyramid):

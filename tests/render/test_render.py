@@ -1,3 +1,5 @@
+import math
+
 import numpy as np
 import pytest
 
@@ -147,12 +149,43 @@ def test_depths(small_pxi):
         ({"layers": []}, UsageError),
         ({"layers": [0], "background": False}, UsageError),
         ({"engine": "magic"}, UsageError),
+        ({"engine": []}, UsageError),
+        ({"layers": "disc"}, UsageError),
+        ({"layers": 2}, UsageError),
+        ({"layers": [1.0]}, UsageError),
+        ({"layers": [None]}, UsageError),
+        ({"layers": [slice(0, 2)]}, UsageError),
+        ({"scale": "2"}, UsageError),
+        ({"scale": [2, 2]}, UsageError),
+        ({"scale": 1j}, UsageError),
+        ({"scale": 10**400}, UsageError),
+        ({"region": ()}, UsageError),
+        ({"region": (1, 2, 3)}, UsageError),
+        ({"region": 7}, UsageError),
+        ({"width": "9"}, UsageError),
+        ({"t": 0.5}, UsageError),
         ({"scale": 1e4}, LimitError),
     ],
 )
 def test_senseless_requests_are_refused(request_, error, small_pxi):
     with pytest.raises(error):
         pxi.open(small_pxi).render(**request_)
+
+
+@pytest.mark.parametrize("t", ["1", [1], math.nan, math.inf, 10**400, 1j])
+def test_senseless_times_are_refused(t, moving_pxi):
+    with pytest.raises(UsageError, match="t = "):
+        pxi.open(moving_pxi).render(t=t)
+
+
+@pytest.mark.parametrize("where", ["compose.engines.find", "pixels._finished"])
+def test_too_little_memory_is_a_limit(where, small_pxi, monkeypatch):
+    def fails(*_):
+        raise MemoryError
+
+    monkeypatch.setattr(f"proxyimg_codec.render.{where}", fails)
+    with pytest.raises(LimitError, match="memory to draw"):
+        pxi.open(small_pxi).render()
 
 
 def test_missing_engines_are_named(small_pxi, monkeypatch):

@@ -100,3 +100,8 @@ def implicit():
     n = Numbers("implicit")
     stack = [changed(v, texture=texture(n, grid=(9, 8))) for v in layers(planes("none"))]
     return image_of(*SIZE, 3, True, 8, Layers(stack), (network(n),))
+
+
+def filled(view):
+    """Whether a view has had to fill what does not show."""
+    return any("filled" in key for key in vars(view))

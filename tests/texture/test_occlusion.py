@@ -14,7 +14,7 @@ from proxyimg_codec.texture.diffusion import diffused
 from proxyimg_codec.texture.occlusion import ALL_IN_PLACE, ALL_REMOVED, Moved, Occlusion
 from proxyimg_codec.texture.pyramid import FILL_ONE
 from tests.support.edits import near
-from tests.support.pyramids import planes, view
+from tests.support.pyramids import filled, planes, view
 
 UNIT = 4
 PART = 7, 4, 21, 18
@@ -141,19 +141,19 @@ def test_others_are_filled_from_those_that_can_be_trusted(cut):
     shown, trusted = cut.cuts.shown, cut.cuts.trusted
     assert 0 < trusted.sum() < shown.sum() < shown.size
     fixed = np.where(trusted[..., None], np.rint(crop * FILL_ONE), 0).astype(np.int32)
-    filled = np.moveaxis(diffused(np.moveaxis(fixed, 2, 0), trusted), 0, 2) / FILL_ONE
+    fill = np.moveaxis(diffused(np.moveaxis(fixed, 2, 0), trusted), 0, 2) / FILL_ONE
     got = cut.sample(*centres(shown | True), PART).reshape(h, w, 3)
     np.testing.assert_array_equal(got[shown], crop[shown])
-    np.testing.assert_allclose(got[~shown], filled[~shown], atol=1e-6)
-    assert np.abs(crop - filled)[shown & ~trusted].max() > 0.02
+    np.testing.assert_allclose(got[~shown], fill[~shown], atol=1e-6)
+    assert np.abs(crop - fill)[shown & ~trusted].max() > 0.02
 
 
 def test_filling_waits_until_it_is_needed(cut):
     shown = cut.cuts.shown
     cut.sample(*centres(shown), PART)
-    assert "filled" not in cut.__dict__
+    assert not filled(cut)
     cut.sample(*(v[:1] for v in centres(~shown)), PART)
-    assert "filled" in cut.__dict__
+    assert filled(cut)
 
 
 def test_what_is_kept(cut):

@@ -1,4 +1,7 @@
-/** Why a file is refused: `kind` is "invalid", "unsupported" or "limit" (spec, "Errors"). */
+/**
+ * Why a file is refused: `kind` is "invalid", "unsupported" or "limit" (spec, "Errors"); or why a
+ * request to draw it is: "usage" or "limit".
+ */
 export class PxiError extends Error {
   constructor(kind, message) {
     super(message);

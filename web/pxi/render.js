@@ -5,28 +5,31 @@ import { FULL, coverage, scalePaths } from "./geometry.js";
 import { anchors, featuresAt, featuresOf, globalFeature, runNetwork } from "./implicit.js";
 import { ANCHOR_COST, Budget, SAMPLE_COST } from "./limits.js";
 import { outline } from "./pose.js";
+import { DTYPES, nearest, requested } from "./request.js";
 import { sampleView } from "./view.js";
 
 const SAMPLES_MAX = 64; // a pixel, in each direction
 const BAND = 2 ** 16; // samples that are computed together, about
 
 /**
- * Renders a view.
+ * Renders the picture, or part of it, at any size. Throws PxiError, of kind "usage" if the options
+ * contradict each other, are out of range or of another type.
  *
- * `options`: `region` [x, y, w, h] in canvas pixels, by default all; `width` and `height`, by
- * default those of the region; `drawn`, the numbers of the layers to draw; `time` in microseconds,
- * or null for the still. Returns {width, height, channels, data}: straight colour, and alpha if
- * there are 4 channels, in 0..1.
+ * `options` are those of `Image.render` in Python; null or undefined is the default:
+ * `t`, time in seconds, by default the still; `width` and `height` in pixels, where one of them alone
+ * keeps the aspect ratio; `scale`, output pixels per canvas pixel, instead of both; `region`,
+ * [x, y, width, height] in canvas pixels, by default the canvas; `layers`, names or positions, by
+ * default all that are not hidden; `background`, whether to draw the back layer of an opaque picture;
+ * `dtype`, "float32" in 0..1 (default), "uint8" or "uint16", rounded; `limits`, changes of the limits
+ * of the image; `progress`, called with the number of pixels that were just drawn.
+ *
+ * Returns {width, height, channels, data}: straight colour, and alpha if there are 4 channels.
  */
 export function render(image, options = {}) {
-  const region = options.region ?? [0, 0, image.width, image.height];
-  const width = options.width ?? region[2];
-  const height = options.height ?? region[3];
-  const budget = new Budget(image.limits);
+  const { region, width, height, drawn, time, dtype } = requested(image, options);
+  const budget = new Budget({ ...image.limits, ...options.limits });
   budget.spend("output_pixels", width * height);
-  const still = image.names.flatMap(({ hidden }, k) => (hidden ? [] : [k]));
-  const drawn = options.drawn ?? still;
-  const moves = image.motion && options.time != null ? image.motion.at(options.time) : new Map();
+  const moves = time === null ? new Map() : image.motion.at(time);
   const view = viewOf(region, width, height);
   budget.spend("multiply_adds", drawn.length * view.columns * view.rows * SAMPLE_COST);
   const order = [...drawn].sort((a, b) => b - a);
@@ -38,8 +41,15 @@ export function render(image, options = {}) {
   for (let y = 0; y < height; y += step) {
     const band = bandOf(view, y * view.sy, Math.min(y + step, height) * view.sy);
     average(view, band, composite(sheets, band), channels, data);
+    options.progress?.(width * ((band.bottom - band.top) / view.sy));
   }
-  return { width, height, channels, data };
+  return { width, height, channels, data: converted(data, dtype) };
+}
+
+/** Samples of a type of `DTYPES`, rounded, from those in 0..1. */
+function converted(data, dtype) {
+  const { array, top } = DTYPES[dtype];
+  return top === 1 ? data : array.from(data, (v) => nearest(Math.fround(v * top)));
 }
 
 /** REN-2 and REN-3. */

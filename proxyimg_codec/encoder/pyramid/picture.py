@@ -72,10 +72,8 @@ def encode_picture(picture: Floats, plan: Plan, settings: Settings, report: Repo
     rasters = [colour_of(picture)._replace(structural=settings.tune == "ms-ssim")]
     if plan.channels == 4:
         rasters.append(alpha_of(picture[..., 3]))
-    interrupts = Interrupts()
 
-    def at(step: int, effort: Effort) -> Picture:
-        sources = _coded(rasters, step, effort, settings, report, interrupts)
+    def picture_of(sources: Sequence[Planes]) -> Picture:
         layers = [
             Layer(v.name, box, v.boundary,
                   PyramidTexture(sources[0], sources[1] if len(sources) > 1 else None, box,
@@ -84,10 +82,34 @@ def encode_picture(picture: Floats, plan: Plan, settings: Settings, report: Repo
         ]  # fmt: skip
         return Picture(width, height, plan.channels, plan.opaque, 8, Layers(layers), ())
 
+    return encode_rasters(rasters, picture_of, picture, settings, report)
+
+
+def encode_rasters(
+    rasters: Sequence[Raster], picture_of: Callable[[Sequence[Planes]], Picture], original: Floats,
+    settings: Settings, report: Report,
+) -> Picture:  # fmt: skip
+    """Encodes rasters so that the picture made of them meets the target of the settings, if any.
+
+    Args:
+        rasters: The rasters.
+        picture_of: Makes the picture of the planes of all rasters.
+        original: float32 [H, W, 4] in 0..1 with straight alpha: how the picture should look.
+        settings: Settings of the encoder.
+        report: As for `encode_picture`.
+
+    Raises:
+        UsageError: A target size or PSNR is out of reach.
+    """
+    interrupts = Interrupts()
+
+    def at(step: int, effort: Effort) -> Picture:
+        return picture_of(_coded(rasters, step, effort, settings, report, interrupts))
+
     effort = EFFORTS[settings.effort - 1]
     if settings.target is None:
         return at(settings.step, effort)
-    return _aimed(at, picture, settings, effort, interrupts)
+    return _aimed(at, original, settings, effort, interrupts)
 
 
 def _coded(
@@ -95,7 +117,7 @@ def _coded(
     interrupts: Interrupts,
 ) -> list[Planes]:  # fmt: skip
     """Encodes all rasters at the step of index `step`; records an interrupt in `interrupts`."""
-    work = len(rasters) * rasters[0].samples[..., 0].size * (effort.steps + effort.rounds)
+    work = sum(r.samples[..., 0].size for r in rasters) * (effort.steps + effort.rounds)
     done = 0
 
     def tick(samples: int) -> None:

@@ -19,37 +19,44 @@ WINDOW, SIGMA = 11, 1.5
 def ms_ssim(a: Tensor, b: Tensor) -> Tensor:
     """Multi-scale structural similarity of pictures.
 
-    Pictures that are too small for all scales use the first ones, with exponents that sum to 1.
+    Pictures that are too small for all scales use the first ones, with exponents that sum to 1; for
+    those smaller than the window, it is as wide or high as they are.
 
     Args:
-        a: float32 [B, C, H, W] pictures in 0..255, of at least `WINDOW` samples a side.
+        a: float32 [B, C, H, W] pictures in 0..255.
         b: float32 [B, C, H, W] pictures to compare them with.
 
     Returns:
         float32 [B], 1 for equal pictures.
     """
-    x = torch.arange(WINDOW, dtype=a.dtype) - WINDOW // 2
-    window = torch.exp(-(x**2) / (2 * SIGMA**2))
-    window /= window.sum()
     channels = a.shape[1]
     scales = max(min(len(WEIGHTS), (min(a.shape[2:]) // WINDOW).bit_length()), 1)
     total = sum(WEIGHTS[:scales])
     out = torch.ones(a.shape[0], channels)
     for scale in range(scales):
-        mean = _blur(torch.cat([a, b, a * a, b * b, a * b]), window).chunk(5)
+        mean = _blur(torch.cat([a, b, a * a, b * b, a * b])).chunk(5)
         ab, aa, bb = mean[0] * mean[1], mean[0] ** 2, mean[1] ** 2
         part = (2 * (mean[4] - ab) + C2) / (mean[2] - aa + mean[3] - bb + C2)
         if scale == scales - 1:
             part = part * (2 * ab + C1) / (aa + bb + C1)
         power = WEIGHTS[scale] / total
         out = out * part.mean((2, 3)).clamp_min(1e-4) ** power
-        a, b = F.avg_pool2d(a, 2), F.avg_pool2d(b, 2)
+        if scale < scales - 1:
+            a, b = F.avg_pool2d(a, 2), F.avg_pool2d(b, 2)
     return out.mean(1)
 
 
-def _blur(x: Tensor, window: Tensor) -> Tensor:
+def _blur(x: Tensor) -> Tensor:
     """Gaussian mean of each channel at all places where the window fits into the picture."""
-    channels = x.shape[1]
-    across = window.view(1, 1, 1, -1).expand(channels, 1, 1, -1)
-    down = window.view(1, 1, -1, 1).expand(channels, 1, -1, 1)
+    channels, height, width = x.shape[1:]
+    across = _window(width).view(1, 1, 1, -1).expand(channels, 1, 1, -1)
+    down = _window(height).view(1, 1, -1, 1).expand(channels, 1, -1, 1)
     return F.conv2d(F.conv2d(x, across, groups=channels), down, groups=channels)
+
+
+def _window(extent: int) -> Tensor:
+    """Gaussian weights float32 [n] that add up to 1, with n at most the extent of the picture."""
+    n = min(WINDOW, extent)
+    x = torch.arange(n, dtype=torch.float32) - (n - 1) / 2
+    window = torch.exp(-(x**2) / (2 * SIGMA**2))
+    return window / window.sum()

@@ -33,8 +33,8 @@ def fit_paths_chamfer(
     equal intervals. Adam minimises the two-way Chamfer distance: the sum of squared distances from
     each curve point to the nearest contour point, and back. After every `split_every` iterations,
     segments whose mean distance from their part of the contour exceeds `tau` are halved by de
-    Casteljau's construction. A loop that crosses itself or another one is taken from `fit_paths`
-    instead.
+    Casteljau's construction. A loop that crosses itself or another one is taken as it was before
+    the last split; if it did so before the first one, from `fit_paths`.
 
     Args:
         mask: bool [H, W], True inside.
@@ -60,19 +60,21 @@ def fit_paths_chamfer(
     if outline is None:
         return []
     side = float(outline.extent.max())
-    paths = []
-    for loop in np.split(outline.points, np.flatnonzero(np.diff(outline.base)) + 1):
-        control = _descend(loop / side, segments, iterations, split_every, tau) * side
-        paths.append(np.rint(np.clip(control, 0, outline.extent) / step).astype(np.int64))
-    # This ends after at most one round per loop, because `safe` as a whole has no faults.
-    while any(bad := [f.any() for f in faults(paths, outline.positive)]):
-        paths = [s if b else p for p, s, b in zip(paths, safe, bad, strict=True)]
-    return paths
+    loops = np.split(outline.points, np.flatnonzero(np.diff(outline.base)) + 1)
+    stages = []
+    for loop, sound in zip(loops, safe, strict=True):
+        found = _descend(loop / side, segments, iterations, split_every, tau)
+        inside = (np.clip(control * side, 0, outline.extent) for control in found)
+        stages.append([sound, *(np.rint(p / step).astype(np.int64) for p in inside)])
+    # This ends, because the first stages, those of `fit_paths`, have no faults together.
+    while any(bad := [f.any() for f in faults([s[-1] for s in stages], outline.positive)]):
+        stages = [s[:-1] if b and len(s) > 1 else s for s, b in zip(stages, bad, strict=True)]
+    return [s[-1] for s in stages]
 
 
 def _descend(
     contour: Floats, segments: int, iterations: int, split_every: int, tau: float
-) -> Floats:
+) -> list[Floats]:
     """Fits one closed path to a contour.
 
     Args:
@@ -83,7 +85,8 @@ def _descend(
         tau: As for `fit_paths_chamfer`.
 
     Returns:
-        float64 [3m, 2] control points in long sides of the canvas.
+        float64 [3m, 2] control points in long sides of the canvas: before each split, and at the
+        end.
     """
     from ..yielding import torch
 
@@ -92,6 +95,7 @@ def _descend(
     control = target[torch.arange(count) * len(target) // count]
     t = torch.arange(_SAMPLES) / _SAMPLES
     basis = torch.stack([(1 - t) ** 3, 3 * (1 - t) ** 2 * t, 3 * (1 - t) * t * t, t**3], 1)
+    stages: list[Floats] = []
     for done in range(0, iterations, split_every):
         if done:
             control = _split(control, _error(basis @ _quads(control), target) > tau)
@@ -107,7 +111,8 @@ def _descend(
             loss.backward()  # type: ignore[no-untyped-call]  # untyped in torch's stubs
             adam.step()
         control = control.detach()
-    return control.double().numpy()
+        stages.append(control.double().numpy())
+    return stages
 
 
 def _error(curve: "torch.Tensor", target: "torch.Tensor") -> "torch.Tensor":

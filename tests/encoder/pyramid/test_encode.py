@@ -259,3 +259,11 @@ def test_registered_weights_are_what_the_specification_says():
         data = (files / f"{entry.file}.bin").read_bytes()
         assert hashlib.sha256(data).hexdigest() == entry.digest
         assert len(data) <= 250_000
+
+
+@pytest.mark.parametrize("size", [(1, 2), (3, 5), (8, 8), (9, 1), (13, 10)])
+@pytest.mark.parametrize("channels", [1, 3])
+def test_small_pictures_are_tuned_too(size, channels):
+    pixels = np.random.default_rng(2).integers(0, 256, (*size, channels)).astype(np.uint8)
+    image = encode(pixels, tune="ms-ssim", effort=1, quality=90)
+    assert psnr(pixels, from_bytes(image.to_bytes())) > 20

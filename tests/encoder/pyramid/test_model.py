@@ -1,6 +1,7 @@
 """The model in torch against what the decoder does, and against the mathematics behind it."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -219,6 +220,16 @@ def test_structural_similarity_is_the_benchmarks():
               for t in (a, b)]  # fmt: skip
     tensors = [torch.from_numpy(v.astype(np.float32)).permute(2, 0, 1)[None] for v in arrays]
     assert float(ms_ssim(*tensors)) == pytest.approx(measure.ms_ssim(*arrays), abs=1e-4)
+
+
+@pytest.mark.parametrize(("width", "height"), [(2, 2), (4, 6), (8, 8), (10, 11), (2, 64)])
+def test_structural_similarity_of_small_pictures(width, height):
+    """The window is no larger than the picture."""
+    a = torch.rand(1, 3, height, width, generator=torch.Generator().manual_seed(5)) * 255
+    noise = torch.rand(a.shape, generator=torch.Generator().manual_seed(6)) - 0.5
+    values = [float(ms_ssim(a, a + s * noise)) for s in (0, 20, 80, 200)]
+    assert values[0] == pytest.approx(1)
+    assert all(one > other for one, other in pairwise(values))
 
 
 def test_levels_halve_the_step():

@@ -311,6 +311,16 @@ def test_chamfer_splits_where_it_is_far_off():
     assert len(fit_paths_chamfer(STAR, iterations=120, split_every=60, tau=1e-9)[0]) > 12
 
 
+@pytest.mark.parametrize("radius", [13, 25.5, 31])
+def test_chamfer_goes_back_to_before_the_split_that_crossed(radius):
+    """With so small a `tau` all segments of a disc are split until they are shorter than a step."""
+    mask = np.hypot(X - 60, Y - 48) < radius
+    paths = fit_paths_chamfer(mask, iterations=700, split_every=100, tau=1e-9)
+    check(mask, paths)
+    assert iou(mask, paths) > 0.97
+    assert len(paths[0]) > len(fit_paths(mask)[0])
+
+
 def test_chamfer_is_repaired():
     mask = blob(1, 1.0, (32, 40))
     check(mask, fit_paths_chamfer(mask, iterations=3))
