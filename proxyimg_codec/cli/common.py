@@ -79,8 +79,6 @@ def run(prog: str, work: Callable[[], None]) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
         # Names of layers may have characters that the terminal cannot show.
         sys.stdout.reconfigure(errors="backslashreplace")
-    # Threads of torch that wait must not spin: beside other programs that took 7 times as long.
-    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     try:
         with ending():
             work()
