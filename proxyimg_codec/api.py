@@ -366,9 +366,8 @@ def encode(
             type is white, bool, or floating point in 0..1.
         settings: Settings of the encoder; by default ``Settings()``.
         masks: Layers given by the user, back to front; by default the encoder finds layers itself.
-            A list of arrays [H, W] (bool, 0 and 1, 0..255, or floats in 0..1, cut at one half) or
-            of regions, a dict of arrays by name, an array [N, H, W], or one array [H, W] of labels
-            0, 1, 2, ... of which 0 is the back.
+            Arrays [H, W] (bool, 0 and 1, 0..255, or 0..1, cut at one half) or regions in a list, in
+            a dict by name or in an array [N, H, W]; or one array [H, W] of labels, 0 is the back.
         blocks: Metadata blocks to carry: ``icc`` and ``cicp``, which say what colours these are,
             ``exif`` and ``xmp``; `io.raster.read` gives those of a file.
         progress: Called with the name of a stage, and its numbers of units done and in all.
@@ -381,16 +380,13 @@ def encode(
         InputError: The array cannot be a picture, or a mask is none or does not fit it.
         UsageError: A setting is out of range.
         UnsupportedError: A package that is needed is not installed.
-        LimitError: The picture is larger than readers accept by default, or needs more memory than
-            there is.
+        LimitError: The picture is larger than readers accept by default, or than memory.
 
     Examples:
         >>> import numpy as np
         >>> import proxyimg_codec as pxi
         >>> pixels = np.full((48, 64, 3), 200, np.uint8)
-        >>> pixels[:, 32:] = 60
-        >>> image = pxi.encode(pixels, quality=40, effort=1, max_layers=1)
-        >>> image.render().shape
+        >>> pxi.encode(pixels, quality=40, effort=1, max_layers=1).render().shape
         (48, 64, 3)
     """
     try:
@@ -399,7 +395,6 @@ def encode(
         raise UnsupportedError(
             f"encode needs {error.name}: pip install 'proxyimg-codec[encode]'"
         ) from None
-    found = encoder.encode(
-        pixels, settings, masks=masks, blocks=blocks, progress=progress, **options
+    return Image(
+        encoder.encode(pixels, settings, masks=masks, blocks=blocks, progress=progress, **options)
     )
-    return Image(found)
