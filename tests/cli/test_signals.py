@@ -81,7 +81,7 @@ def test_each_signal_has_its_exit_code(small_pxi, tmp_path, name, code):
 
 @pytest.mark.encoder
 def test_encoding_ends(tmp_path):
-    from proxyimg_codec.io.raster import encode_ppm
+    from proxyimg_codec.io.png import encode_ppm
 
     (tmp_path / "a.ppm").write_bytes(encode_ppm(smooth(21, 13)))
     code, text = ran("encode", FSYNC, tmp_path / "a.ppm", "-e", "1", "--layers", "1")
@@ -91,7 +91,7 @@ def test_encoding_ends(tmp_path):
 
 @pytest.mark.encoder
 def test_the_workers_of_a_benchmark_end_too(tmp_path):
-    from proxyimg_codec.io.raster import encode_ppm
+    from proxyimg_codec.io.png import encode_ppm
 
     for name in ("imagecodecs", "matplotlib", "PIL"):
         pytest.importorskip(name)

@@ -71,13 +71,23 @@ def test_bad_type_is_refused():
 def test_other_versions_are_unsupported_not_invalid():
     data = bytearray(FILE)
     data[8] = 1
-    with pytest.raises(UnsupportedError, match=r"1\.9"):
+    with pytest.raises(UnsupportedError, match=r"1\.10"):
         read(bytes(data))
 
 
 @pytest.mark.parametrize(
     ("minor", "known"),
-    [(0, False), (1, True), (2, True), (3, True), (4, False), (8, False), (9, True), (10, False)],
+    [
+        (0, False),
+        (1, True),
+        (2, True),
+        (3, True),
+        (4, False),
+        (8, False),
+        (9, True),
+        (10, True),
+        (11, False),
+    ],
 )
 def test_known_versions_are_read(minor, known):
     data = bytearray(FILE)
@@ -86,7 +96,7 @@ def test_known_versions_are_read(minor, known):
         assert len(read(bytes(data))) == 3
         return
     with pytest.raises(
-        UnsupportedError, match=rf"0\.{minor}, this program reads 0\.1, 0\.2, 0\.3, 0\.9;"
+        UnsupportedError, match=rf"0\.{minor}, this program reads 0\.1, 0\.2, 0\.3, 0\.9, 0\.10;"
     ):
         read(bytes(data))
 
