@@ -11,7 +11,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from proxyimg_codec.encoder.pyramid.model import Model, weight_step
+from proxyimg_codec.encoder.pyramid.convolutions import weight_step
+from proxyimg_codec.encoder.pyramid.model import Model
 from proxyimg_codec.texture.registered_model import CAUSAL, LEVEL_SETS, Array, pack
 
 

@@ -12,7 +12,8 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from proxyimg_codec.encoder.pyramid.model import Level, Model, Residual
+from proxyimg_codec.encoder.pyramid.convolutions import Residual
+from proxyimg_codec.encoder.pyramid.model import Level, Model
 from proxyimg_codec.encoder.pyramid.rate import bits_of_integers
 from proxyimg_codec.encoder.pyramid.refine import (
     DEAD_ZONE,

@@ -96,10 +96,7 @@ def read_openraster(data: bytes, name: str, limits: Limits = DEFAULT_LIMITS) -> 
             blend mode other than source-over or is no layer.
         LimitError: The file exceeds `limits`.
     """
-    try:
-        archive = zipfile.ZipFile(io.BytesIO(data))
-    except (zipfile.BadZipFile, NotImplementedError, ValueError, struct.error) as error:
-        raise InputError(f"{name}: not an OpenRaster file ({error})") from None
+    archive = _opened(data, name)
     root = xml.parse(_entry(archive, "stack.xml", name, xml.BYTES_MAX), f"{name}: stack.xml")
     if root.tag != "image" or root.find("stack") is None:
         raise InputError(f"{name}: stack.xml holds no stack of layers")
@@ -142,6 +139,13 @@ def read_openraster(data: bytes, name: str, limits: Limits = DEFAULT_LIMITS) -> 
     if not layers:
         raise InputError(f"{name}: no layer has a pixel on the canvas of {width}x{height}")
     return LayeredPicture(width, height, tuple(layers), blocks or {}, tuple(left_out))
+
+
+def _opened(data: bytes, name: str) -> zipfile.ZipFile:
+    try:
+        return zipfile.ZipFile(io.BytesIO(data))
+    except (zipfile.BadZipFile, NotImplementedError, ValueError, struct.error) as error:
+        raise InputError(f"{name}: not an OpenRaster file ({error})") from None
 
 
 def _check(limits: Limits, name: str, value: int, where: str) -> None:

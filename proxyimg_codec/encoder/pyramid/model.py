@@ -5,14 +5,14 @@ Arrays are tensors; B counts pictures. Latents of a level have 9 channels 3 * co
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
+from .convolutions import Convolution, Residual, convolve, eight_bit, through, weight_step
 from .wavelet import (
     Size,
     analysis_weights,
@@ -46,26 +46,6 @@ class Likelihood(NamedTuple):
 
     mean: Tensor
     log_scale: Tensor
-
-
-class _Through(torch.autograd.Function):
-    """Rounding to multiples of a step within bounds, inside which the gradient passes unchanged."""
-
-    @staticmethod
-    def forward(ctx: Any, x: Tensor, step: float, low: float, high: float) -> Tensor:
-        ctx.save_for_backward((x >= low * step) & (x <= high * step))
-        return (x * (1 / step)).round_().clamp_(low, high).mul_(step)
-
-    @staticmethod
-    def backward(ctx: Any, grad: Tensor) -> tuple[Tensor, None, None, None]:
-        (inside,) = ctx.saved_tensors
-        return grad * inside, None, None, None
-
-
-def through(x: Tensor, step: float, low: float, high: float) -> Tensor:
-    """Rounds `x`, straight through, to multiples of `step` in low * step..high * step."""
-    rounded: Tensor = _Through.apply(x, step, low, high)  # type: ignore[no-untyped-call]  # torch's stubs
-    return rounded
 
 
 def squash(x: Tensor) -> Tensor:
@@ -249,17 +229,17 @@ class Level(nn.Module):
         self.synthesis = Residual(12, hidden, 12)
         self.analysis = Residual(12, hidden, 12)
         # Context network
-        self.first = _Conv(12, context, 3)
+        self.first = Convolution(12, context, 3)
         self.first_by_step = nn.Parameter(torch.zeros(context))
-        self.second = _Conv(context, context, 3)
+        self.second = Convolution(context, context, 3)
         self.causal = nn.Parameter(torch.zeros(context, 18, 3, 5))
         mask = torch.ones(3, 5)
         mask[2, 2:] = 0
         self.register_buffer("mask", mask, persistent=False)
-        self.mix = _Conv(context, context, 1)
-        self.luma = _Conv(context, 6, 1)
-        self.from_luma = _Conv(6, context, 1)
-        self.chroma = _Conv(context, 12, 1)
+        self.mix = Convolution(context, context, 1)
+        self.luma = Convolution(context, 6, 1)
+        self.from_luma = Convolution(6, context, 1)
+        self.chroma = Convolution(context, 12, 1)
 
     def gains(self, q: Tensor) -> Tensor:
         """Gains of the bands, [B, 9, 1, 1], for a result of `log_step`."""
@@ -335,75 +315,6 @@ class Level(nn.Module):
         return convolve(x, w, b, pad, self.fast)
 
 
-def weight_step(weights: Tensor) -> float:
-    """Smallest power of two in 2**-12..2**-3 in units of which weights are at most 127."""
-    most = max(float(weights.detach().abs().max()), 1e-6)
-    return 2.0 ** min(max(math.ceil(math.log2(most / 127)), -12), -3)
-
-
-def eight_bit(weights: Tensor) -> Tensor:
-    """Rounds weights to integers in -127..127, in units of the smallest power of two that fits."""
-    most = max(float(weights.detach().abs().max()), 1e-6)
-    return through(weights, 2.0 ** math.ceil(math.log2(most / 127)), -127, 127)
-
-
 def features(y: Tensor) -> Tensor:
     """Features [B, 2n, h, w] of latents [B, n, h, w] for the context network."""
     return torch.cat([squash(y), torch.log1p(y.abs())], 1)
-
-
-def convolve(x: Tensor, w: Tensor, b: Tensor | None, pad: tuple[int, int], fast: bool) -> Tensor:
-    """Convolves `x` with weights `w`, biases `b` and zero padding `pad`; in bfloat16 if `fast`."""
-    if not fast:
-        return F.conv2d(x, w, b, padding=pad)
-    half = torch.bfloat16
-    return F.conv2d(x.to(half), w.to(half), None if b is None else b.to(half), padding=pad)
-
-
-class _Conv(nn.Conv2d):
-    """Convolution with weights of 0: to draw them takes random numbers of the whole process."""
-
-    def reset_parameters(self) -> None:
-        for p in self.parameters():
-            nn.init.zeros_(p)
-
-
-class Residual(nn.Module):
-    """Network of three convolutions: 3 x 3, 1 x 1 and 3 x 3. Its initial output is 0.
-
-    Args:
-        inputs: Input channels.
-        hidden: Width of the hidden layers.
-        outputs: Output channels.
-
-    Attributes:
-        by_step: [hidden] slope of the biases of the first layer by `log_step`.
-    """
-
-    def __init__(self, inputs: int, hidden: int, outputs: int) -> None:
-        super().__init__()
-        self.first = _Conv(inputs, hidden, 3)
-        self.by_step = nn.Parameter(torch.zeros(hidden))
-        self.second = _Conv(hidden, hidden, 1)
-        self.third = _Conv(hidden, outputs, 3)
-
-    def forward(self, x: Tensor, q: Tensor, fast: bool, quantized: bool = False) -> Tensor:
-        """Runs the network.
-
-        Args:
-            x: [B, inputs, h, w] inputs.
-            q: [B, 1, 1, 1] result of `log_step`.
-            fast: Whether convolutions run in bfloat16.
-            quantized: Whether to simulate 8-bit weights.
-
-        Returns:
-            float32 [B, outputs, h, w].
-        """
-        first, second, third = (
-            eight_bit(layer.weight) if quantized else layer.weight
-            for layer in (self.first, self.second, self.third)
-        )
-        z = convolve(x, first, self.first.bias, (1, 1), fast)
-        z = F.relu(z + (self.by_step.view(1, -1, 1, 1) * q).to(z.dtype))
-        z = F.relu(convolve(z, second, self.second.bias, (0, 0), fast))
-        return convolve(z, third, self.third.bias, (1, 1), fast).float()
