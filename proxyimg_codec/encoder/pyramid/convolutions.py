@@ -54,6 +54,7 @@ class Convolution(nn.Conv2d):
     """Convolution with weights of 0: to draw them takes random numbers of the whole process."""
 
     def reset_parameters(self) -> None:
+        """Sets weights and biases to 0."""
         for p in self.parameters():
             nn.init.zeros_(p)
 
