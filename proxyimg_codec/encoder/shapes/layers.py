@@ -92,7 +92,7 @@ def plan_layers(picture: Floats, settings: Settings, masks: Sequence[Region] | N
     support = None if opaque else alpha >= 0.5
     if support is not None and soft:
         # Crisp outlines stay where they are; only translucent parts extend the support.
-        around = _dilate(translucent, 3)
+        around = _dilate(translucent, 3) | _faint(alpha)
         support |= around if settings.pyramid else around & (alpha > 0)
     if support is not None and not support.any():
         return Plan((LayerPlan("empty", None),), 4, False)
@@ -168,4 +168,13 @@ def _translucent(alpha: Floats) -> NDArray[np.bool_]:
     """Translucent pixels, bool [H, W], except for the anti-aliased rims of outlines."""
     inside = alpha >= 0.5
     rim = _dilate(inside, 2) & _dilate(~inside, 2)
+    return (alpha > 0.03) & (alpha < 0.97) & ~rim
+
+
+def _faint(alpha: Floats) -> NDArray[np.bool_]:
+    """Translucent pixels, bool [H, W], except for those between opaque and clear ones.
+
+    So a soft slope counts that passes one half where the picture ends.
+    """
+    rim = _dilate(alpha >= 0.97, 2) & _dilate(alpha <= 0.03, 2)
     return (alpha > 0.03) & (alpha < 0.97) & ~rim

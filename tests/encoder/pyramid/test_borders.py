@@ -99,3 +99,14 @@ def test_windows_end_where_the_raster_ends(size):
     along = np.array_split(errors, 12, axis=int(w > h))
     assert min(map(decibel, along[-2:])) > decibel(errors) - 6
     assert decibel(errors[-RING:, -RING:]) > 25
+
+
+def test_soft_alpha_that_passes_one_half_at_the_border_is_kept():
+    """No outline cuts off what would be taken for the rim of one inside a picture."""
+    y, x = np.mgrid[:77, :93]
+    alpha = np.clip(150 - 1.5 * np.maximum(x - 62, 0) + 30 * np.sin(y / 9), 0, 255)
+    assert (alpha[:, -1] < 128).any()
+    assert (alpha[:, -4] > 128).any()
+    pixels = np.dstack([0 * x + 90, 2 * y, 2 * x, alpha]).astype(np.uint8)
+    back = from_bytes(encode(pixels, quality=90, effort=1, jobs=1).to_bytes()).render()
+    assert np.abs(back[..., 3].astype(int) - pixels[..., 3]).max() < 16
