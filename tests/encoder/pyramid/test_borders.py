@@ -108,5 +108,5 @@ def test_soft_alpha_that_passes_one_half_at_the_border_is_kept():
     assert (alpha[:, -1] < 128).any()
     assert (alpha[:, -4] > 128).any()
     pixels = np.dstack([0 * x + 90, 2 * y, 2 * x, alpha]).astype(np.uint8)
-    back = from_bytes(encode(pixels, quality=90, effort=1, jobs=1).to_bytes()).render()
-    assert np.abs(back[..., 3].astype(int) - pixels[..., 3]).max() < 16
+    image = encode(pixels, quality=90, effort=1, max_layers=1, jobs=1)
+    assert np.abs(image.render()[..., 3].astype(int) - pixels[..., 3]).max() < 16
