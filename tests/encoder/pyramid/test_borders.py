@@ -104,8 +104,8 @@ def test_windows_end_where_the_raster_ends(size):
 def test_soft_alpha_that_passes_one_half_at_the_border_is_kept():
     """No outline cuts off what would be taken for the rim of one inside a picture."""
     y, x = np.mgrid[:77, :93]
-    alpha = np.where(x < 20, 140, 255 - 26 * np.maximum(x - 85, 0))
-    assert alpha[0, -3:].tolist() == [125, 99, 73]
+    alpha = np.where(x < 20, 140, 255 - 26 * np.maximum(x - 86, 0))
+    assert alpha[0, -3:].tolist() == [151, 125, 99]
     pixels = np.dstack([0 * x + 90, 2 * y, 2 * x, alpha]).astype(np.uint8)
     image = encode(pixels, quality=90, effort=1, max_layers=1, jobs=1)
     assert np.abs(image.render()[..., 3].astype(int) - pixels[..., 3]).max() < 16
