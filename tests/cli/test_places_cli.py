@@ -270,6 +270,13 @@ def test_odd_suffixes(tool, here, suffix):
     tool("encode", *TINY, f"b{suffix}", f"c{suffix}", code=2)
 
 
+def test_pxi_edit_names_no_flag_that_it_lacks(tool, picture):
+    picture("a.pxi")
+    err = tool("edit", "a.pxi", "b.pxi", "c.pxi", "--hide", "1", code=2).err
+    assert "3 files are too many for IN OUT" in err
+    assert "-o" not in err
+
+
 def test_a_negative_name_needs_no_dashes_in_pxi_edit(tool, picture):
     picture("-5.pxi")
     tool("edit", "-5.pxi", "--move", "-1", "-.5,-3", "-6.pxi")
@@ -394,6 +401,11 @@ def test_an_error_that_names_no_file_gets_its_name(tool, here):
         (("-", "b.png", "-o", "out/"), "standard input"),
         (("/", "b.png", "-o", "out/"), "'/'"),
         (("a.png", "b.png", "-o", "out/", "--masks", "m"), "--masks"),
+        (("a.png", ""), "empty"),
+        (("", "c.pxi"), "empty"),
+        (("a.png", "-o", ""), "empty"),
+        (("a.png", "", "-o", "out/"), "empty"),
+        (("a.png", "c.pxi", "--masks", ""), "empty"),
         (("a.png", "b.png", "-o", "out/", "-q", "101"), "quality"),
         (("-o", "out/"), "IN is missing"),
         ((), "IN is missing"),
