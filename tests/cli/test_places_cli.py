@@ -97,6 +97,18 @@ def test_standard_streams_by_name(launch, here):
     assert drawn[:4] == b"\x89PNG"
 
 
+@encoder
+def test_nothing_but_the_picture_goes_to_standard_output_if_standard_error_is_closed(launch, here):
+    png("a.png")
+    closed = {"first": "exec 2>&-"}
+    data = launch("encode", "a.png", "-", *TINY).out
+    assert launch("encode", "a.png", "-", *TINY, **closed).out == data
+    with open("a.pxi", "wb") as file:
+        file.write(data)
+    assert launch("decode", "a.pxi", "-", **closed).out == launch("decode", "a.pxi", "-").out
+    assert launch("edit", "a.pxi", "b.pxi", "--bake", **closed).out == b""
+
+
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no named pipes")
 @pytest.mark.parametrize("words", [("edit", "a.pxi", "pipe"), ("decode", "a.pxi", "pipe")])
 def test_pipes_of_any_name(tool, picture, words):
