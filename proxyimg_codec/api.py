@@ -80,7 +80,7 @@ class Image(PictureHandle):
     @property
     def layers(self) -> Layers[Layer]:
         """Layers back to front; a layer is addressed by its position or its name."""
-        return Layers.over(MadeOnce(len(self._picture.layers), lambda k: Layer(self, k)))
+        return Layers.over(MadeOnce(len(self._picture.layers), Layer, self))
 
     @property
     def chunks(self) -> tuple[Chunk, ...]:

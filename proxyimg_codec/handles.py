@@ -215,11 +215,12 @@ class MadeOnce(Sequence[T]):
 
     Args:
         count: Number of items.
-        make: Makes the item at a position.
+        make: Makes the item of an owner at a position.
+        owner: The owner.
     """
 
-    def __init__(self, count: int, make: Callable[[int], T]) -> None:
-        self._count, self._make = count, make
+    def __init__(self, count: int, make: Callable[[Any, int], T], owner: Any) -> None:
+        self._count, self._make, self._owner = count, make, owner
         self._made: dict[int, T] = {}
 
     def __len__(self) -> int:
@@ -237,5 +238,5 @@ class MadeOnce(Sequence[T]):
         if isinstance(place, range):
             return tuple(self[k] for k in place)
         if place not in self._made:
-            self._made[place] = self._make(place)
+            self._made[place] = self._make(self._owner, place)
         return self._made[place]

@@ -317,6 +317,14 @@ def test_a_moment_of_a_motion_survives_copies(how):
     assert moment != pxi.open(MOVING).at(0.31)
 
 
+def test_the_layers_of_an_image_survive_copies(copied):
+    image = pxi.open(SMALL)
+    for layers in (image.layers, image.layers["disc"].moved(2, 1).layers):
+        again = copied(layers)
+        assert again == layers
+        assert [layer.name for layer in again] == [layer.name for layer in layers]
+
+
 def test_nothing_of_a_handle_can_be_set():
     image = pxi.open(SMALL)
     for handle in (image, image.layers["disc"]):

@@ -76,6 +76,8 @@ def run(prog: str, work: Callable[[], None]) -> int:
     Returns:
         The exit code.
     """
+    if sys.stderr is None:  # closed: messages would go to stdout, and files get its number
+        sys.stderr = os.fdopen(os.open(os.devnull, os.O_WRONLY), "w")
     if isinstance(sys.stdout, io.TextIOWrapper):
         # Names of layers may have characters that the terminal cannot show.
         sys.stdout.reconfigure(errors="backslashreplace")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -192,7 +192,8 @@ def refuse_for_layers(args: argparse.Namespace, kind: str) -> None:
         if getattr(args, name) is not None:
             raise UsageError(f"--{name}: a {kind} file has the size of the canvas")
     if args.srgb:
-        raise UsageError(f"--srgb: a {kind} file has the colours of the input")
+        has = "is sRGB" if kind == ".svg" else "has the colours of the input"
+        raise UsageError(f"--srgb: a {kind} file {has}")
     if args.time is not None and kind == ".svg":
         raise UsageError("--time: a .svg file has the outlines of the still")
     if args.bit_depth is not None and (kind == ".svg" or args.bit_depth == 32):
@@ -288,21 +289,29 @@ def render(image: Any, output: str, args: argparse.Namespace) -> None:
         pixels = rounded(to_srgb(pixels, blocks), dtype)
         blocks = {k: v for k, v in blocks.items() if k not in COLOUR}
     nameless = is_stream(output) and not Path(output).suffix
-    notes = write(output, pixels, blocks, ".png" if nameless else None)
+    remark(args, output, write(output, pixels, blocks, ".png" if nameless else None))
+
+
+def remark(args: argparse.Namespace, output: str, notes: Iterable[str]) -> None:
+    """Prints warnings about an output, unless --quiet."""
     for note in () if args.quiet else notes:
         print(f"pxi-decode: warning: {printable(output)}: {note}", file=sys.stderr)
 
 
 def layered(image: Any, output: str, kind: str, args: argparse.Namespace) -> None:
     """Writes the layers as OpenRaster, or their outlines as SVG."""
+    from ..io.color import COLOUR
     from ..io.files import write_atomically
+    from ..io.raster import losses
 
     layers = [key(n) for n in args.layer] if args.layer else None
     wanted = {"layers": layers, "background": not args.no_background, "engine": args.engine}
+    lost = [name for name in image.blocks if name not in COLOUR]
     if kind == ".svg":
         from ..export.svg import build as build_svg
 
         write_atomically(output, build_svg(image, **wanted))
+        remark(args, output, losses(kind, lost))
         return
     from ..export.openraster import build as build_ora
 
@@ -314,6 +323,7 @@ def layered(image: Any, output: str, kind: str, args: argparse.Namespace) -> Non
     finally:
         bar.close()
     write_atomically(output, data)
+    remark(args, output, losses(kind, lost))
 
 
 def parse_region(text: str | None) -> tuple[int, int, int, int] | None:

@@ -15,6 +15,7 @@ from .common import Bar, parser, printable, warnings_shown
 from .places import (
     add_files,
     add_force_suffix,
+    check_names,
     check_suffix,
     check_target,
     default_target,
@@ -128,10 +129,11 @@ def check(args: argparse.Namespace) -> None:
 
     Raises:
         UsageError: A setting is out of range, flags contradict each other, or masks are given for
-            several pictures.
+            several pictures or have no name.
     """
     from ..errors import UsageError
 
+    check_names(args.masks)
     if args.masks is not None and len(args.inputs) > 1:
         raise UsageError("--masks: they belong to one picture; encode each by itself")
     settings_from(args)

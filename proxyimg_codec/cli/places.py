@@ -59,24 +59,35 @@ def parse(p: argparse.ArgumentParser, words: list[str] | None) -> argparse.Names
     return args
 
 
-def in_and_out(files: list[str], out: str | None = None) -> tuple[str, str | None]:
+def check_names(*names: str | None) -> None:
+    """Refuses empty names, as of a variable of the shell that is not set; None is no name.
+
+    Raises:
+        UsageError: A name is empty.
+    """
+    if "" in names:
+        raise UsageError("the name of a file is empty")
+
+
+def in_and_out(
+    files: list[str], out: str | None = None, hint: str = "see --help"
+) -> tuple[str, str | None]:
     """Input and output of a command line with one input; ``-`` for the standard streams.
 
     Args:
         files: The files that are named without a flag.
         out: The output that is named by a flag.
+        hint: What somebody who names more files may have meant.
 
     Raises:
-        UsageError: There are more files, or none.
+        UsageError: There are more files, or none, or a name is empty.
     """
     if not files:
         raise UsageError("IN is missing; see --help")
     names = files if out is None else [*files, out]
+    check_names(*names)
     if len(names) > 2:
-        raise UsageError(
-            f"{len(files)} files are too many for IN OUT; of several inputs the output is a "
-            "folder: -o FOLDER/"
-        )
+        raise UsageError(f"{len(files)} files are too many for IN OUT; {hint}")
     source = "-" if names[0] in _INPUT else names[0]
     if len(names) == 1:
         return source, None
@@ -91,7 +102,8 @@ def pairs(args: argparse.Namespace, suffix: str) -> list[tuple[str, str | None]]
         suffix: Suffix of the outputs in a folder.
 
     Raises:
-        UsageError: Two inputs have the same output, or several inputs have no folder.
+        UsageError: Two inputs have the same output, several inputs have no folder, or a name is
+            empty.
         InputError: An input has no name to make one of.
     """
     out = args.out
@@ -99,7 +111,9 @@ def pairs(args: argparse.Namespace, suffix: str) -> list[tuple[str, str | None]]
     if not folder:
         if out is not None and len(args.files) > 1:
             raise UsageError(f"-o {out}: several inputs go into a folder; write -o {out}/")
-        return [in_and_out(args.files, out)]
+        several = "of several inputs the output is a folder: -o FOLDER/"
+        return [in_and_out(args.files, out, several)]
+    check_names(*args.files)
     if not args.files:
         raise UsageError("IN is missing; see --help")
     found: list[tuple[str, str | None]] = []

@@ -191,11 +191,15 @@ def fit_image(
 
 
 def check_blocks(blocks: Mapping[str, bytes]) -> None:
-    """Raises `UsageError` if a metadata block is empty, of an unknown kind, or no colour."""
+    """Raises `UsageError` if a metadata block is empty, no bytes, not known, or no colour."""
     for name, block in blocks.items():
         if name not in (*meta.BLOCKS, "cicp") or not block:
             kinds = ", ".join((*meta.BLOCKS, "cicp"))
             raise UsageError(f"metadata block {name!r} is empty or not one of {kinds}")
+        if not isinstance(block, bytes):
+            raise UsageError(
+                f"metadata block {name!r} is of type {type(block).__name__}, not bytes"
+            )
     problem = cicp_problem(blocks["cicp"]) if "cicp" in blocks else None
     if problem is not None:
         raise UsageError(f"metadata block 'cicp': {problem}")

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..geometry.boundary import Boundary
 from ..geometry.pose import OPACITY_MAX
 from ..io import xml
+from ..io.color import is_srgb, to_srgb
 from ..model import Layer, Picture, Pictured
 from ..render.cache import Cache
 from ..render.neighbours import present_outline
@@ -35,8 +36,8 @@ def build(
     """Bytes of an SVG file with one element for each layer, back to front.
 
     A layer is a path with its control points as exact decimal numbers, or a rectangle if it covers
-    the whole canvas. It is filled with its mean colour. Its name is the Inkscape label, and
-    `identifiers` makes its id.
+    the whole canvas. It is filled with its mean colour, in sRGB. Its name is the Inkscape label,
+    and `identifiers` makes its id.
 
     Args:
         image: The picture.
@@ -46,6 +47,8 @@ def build(
 
     Raises:
         UsageError: A layer is unknown, or none is left.
+        UnsupportedError: The picture is not sRGB, and imagecodecs, which converts it, is not
+            installed, or its profile is damaged.
     """
     picture = image.picture
     size = {"width": str(picture.width), "height": str(picture.height)}
@@ -105,7 +108,7 @@ def _decimal(value: int, unit: int) -> str:
 
 
 def _mean_colour(picture: Picture, layer: Layer, engine: str, cache: Cache) -> str:
-    """Mean colour of the pixels of a layer, ``#rrggbb``; black if none are on the canvas."""
+    """Mean colour of a layer in sRGB, ``#rrggbb``; black if no pixel is on the canvas."""
     region = region_of(picture, layer)
     width, height = (min(n, SWATCH) for n in region[2:])
     pixels: NDArray[np.float32] = render(
@@ -114,4 +117,6 @@ def _mean_colour(picture: Picture, layer: Layer, engine: str, cache: Cache) -> s
     )  # fmt: skip
     alpha = pixels[..., 3:] if pixels.shape[2] == 4 else np.ones_like(pixels[..., :1])
     mean = (pixels[..., :3] * alpha).sum((0, 1)) / max(float(alpha.sum()), 1e-6)
+    if not is_srgb(picture.blocks):
+        mean = to_srgb(np.clip(mean, 0, 1)[None, None], picture.blocks)[0, 0]
     return "#" + "".join(f"{round(float(c) * 255):02x}" for c in mean)

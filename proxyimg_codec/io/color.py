@@ -65,6 +65,7 @@ class Colour:
         inks: Whether the pixels are cyan, magenta, yellow and black.
         gamma: Exponent from numbers to light, 1 being linear; None for the curve of sRGB.
         chromaticities: Those of the primaries and the white.
+        lab: Whether the pixels are CIE L*a*b* as in TIFF files.
     """
 
     cicp: tuple[int, ...] | None = None
@@ -72,6 +73,7 @@ class Colour:
     inks: bool = False
     gamma: float | None = None
     chromaticities: Chromaticities = SRGB
+    lab: bool = False
 
 
 ADOBE_RGB = Colour(gamma=563 / 256, chromaticities=(0.64, 0.33, 0.21, 0.71, 0.15, 0.06, *_D65))
@@ -134,6 +136,8 @@ def adopt(pixels: Pixels, stated: Colour) -> tuple[Pixels, dict[str, bytes], lis
         UnsupportedError: imagecodecs, which converts, is not installed.
     """
     notes: list[str] = []
+    if stated.lab:
+        return _from_lab(pixels), {}, ["converted from CIE L*a*b* to sRGB"]
     if stated.cicp is not None:
         problem = cicp_problem(bytes(stated.cicp[:3]) + b"\1")
         if problem is None:
@@ -275,6 +279,19 @@ def _from_profile(pixels: Pixels, icc: bytes, grey: bool) -> Floats:
     else:
         out = _transformed(pixels[..., :4], icc, _srgb_profile(), "cmyk")
     return np.asarray(np.clip(out, 0, 1), np.float32)
+
+
+def _from_lab(pixels: Pixels) -> Floats:
+    """Pixels of CIE L*a*b* as sRGB in float32.
+
+    They are uint8 or uint16 [H, W, 3], in which a* and b* have a sign (TIFF 6.0, section 23).
+    """
+    signed = pixels[..., 1:].astype(f"i{pixels.dtype.itemsize}")
+    steps = 1 if pixels.dtype == np.uint8 else 256
+    lab = np.concatenate([100 * unit(pixels[..., :1]), signed / np.float32(steps)], axis=2)
+    source = _cms().cms_profile("lab4")
+    colour = _transformed(lab.astype(np.float32), source, _srgb_profile(), "lab")
+    return np.asarray(np.clip(colour, 0, 1), np.float32)
 
 
 def _mixed(inks: Pixels) -> Floats:

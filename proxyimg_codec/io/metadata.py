@@ -35,8 +35,9 @@ def raw_blocks(data: bytes, number: int = 0) -> dict[str, bytes]:
 
 
 def left_out(data: bytes) -> list[str]:
-    """Names what a JPEG, PNG or TIFF file tells that is neither EXIF, XMP nor colour."""
+    """Names what a file tells that is neither read as EXIF or XMP, nor colour."""
     found = ["IPTC"] if exif.IPTC in exif.tags(data) else []
+    found += ["XMP"] * (data[:3] == b"GIF" and b"!\xff\x0bXMP DataXMP" in data)
     for marker, body in jpeg_segments(data):
         if marker == 0xED and b"8BIM\x04\x04" in body:
             found.append("IPTC")

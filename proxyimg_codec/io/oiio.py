@@ -32,6 +32,9 @@ LINEAR = (".exr", ".hdr", ".rgbe", ".pfm")
 _SRGB_NAMES = ("", "unknown", "Rec709", "data", "raw", "srgb_rec709_scene", "srgb_rec709_display")
 """Names of colour spaces that are sRGB, or say nothing. OpenImageIO calls all PNM files Rec709."""
 
+_INKS = ("CMYK", "YCCK", "YCbCrK", "color separated")
+"""Names of colour spaces of inks."""
+
 _KINDS = {"uint8": "uint8", "uint16": "uint16", "uint32": "uint", "uint": "uint", "half": "float",
           "float": "float", "double": "float"}  # fmt: skip
 """Types of samples that are read, and as what."""
@@ -50,6 +53,7 @@ class Source:
         place: Number of the subimage of OpenImageIO.
         told: Whether the reader found EXIF, IPTC or XMP, wherever it was.
         mixed: Whether the file has inks, and the reader has made RGB of them.
+        notes: Remarks on what the file has beside the pixels, and is left out.
     """
 
     pixels: Pixels
@@ -60,6 +64,7 @@ class Source:
     place: int = 0
     told: bool = False
     mixed: bool = False
+    notes: tuple[str, ...] = ()
 
 
 def import_oiio() -> Any:
@@ -110,7 +115,7 @@ def read(data: bytes, name: str, frame: int | None = None) -> Source:
         if source is None or source.format_name() in _NO_FILES:
             _error(oiio)
             raise InputError(f"{name}: not a picture in a known format")
-        if _is_cmyk(source.spec()) and source.format_name() == "tiff":
+        if _is_foreign(source.spec()) and source.format_name() == "tiff":
             source.close()
             wanted.attribute("oiio:RawColor", 1)
             source = oiio.ImageInput.open(file.name, wanted)
@@ -120,9 +125,14 @@ def read(data: bytes, name: str, frame: int | None = None) -> Source:
             source.close()
 
 
-def _is_cmyk(spec: Any) -> bool:
-    """Whether the file has inks and a profile of CMYK."""
-    return _icc(spec)[16:20] == b"CMYK"
+def _is_foreign(spec: Any) -> bool:
+    """Whether a file has colours that are converted here: inks with a profile, and L*a*b*."""
+    return _icc(spec)[16:20] == b"CMYK" or _space(spec).endswith("LAB")
+
+
+def _space(spec: Any) -> str:
+    """Name of the colours of the pixels of a TIFF file."""
+    return str(spec.getattribute("tiff:ColorSpace") or "")
 
 
 def _icc(spec: Any) -> bytes:
@@ -170,14 +180,39 @@ def _read(source: Any, name: str, frame: int | None) -> Source:
     type_ = source.format_name()
     told = any(a.name.startswith(("Exif:", "GPS:", "IPTC:", "xmp:")) for a in spec.extra_attribs)
     spaces = (spec.getattribute(f"{kind}:ColorSpace") for kind in ("jpeg", "tiff", "oiio", "psd"))
-    inks = any(str(space) in ("CMYK", "YCCK", "color separated") for space in spaces)
+    inks = any(str(space) in _INKS for space in spaces)
     mixed = inks and "".join(spec.channelnames[:4]) != "CMYK"
     return Source(
         _channels(pixels, spec, type_),
         _colour(spec, type_, pixels.dtype.kind == "f", name),
         spec.get_int_attribute("Orientation", 1), frame, len(numbers), numbers[frame], told,
-        mixed,
+        mixed, tuple(_remarks(spec, type_)),
     )  # fmt: skip
+
+
+def _remarks(spec: Any, type_: str) -> list[str]:
+    """Remarks on channels and on a window that the pixels will not tell."""
+    notes = []
+    names = spec.channelnames[_used(spec, type_) :]
+    if names:
+        more = ", ..." if len(names) > 8 else ""
+        notes.append(f"channels left out: {', '.join(names[:8])}{more}")
+    data = spec.width, spec.height, spec.x, spec.y
+    whole = spec.full_width, spec.full_height, spec.full_x, spec.full_y
+    if type_ == "openexr" and data != whole:
+        notes.append("its data window, {}x{} at {},{}, is taken; its display window is {}x{} at "
+                     "{},{}".format(*data, *whole))  # fmt: skip
+    return notes
+
+
+def _used(spec: Any, type_: str) -> int:
+    """Number of the first channels of a picture that are colour, inks or alpha."""
+    if "".join(spec.channelnames[:4]) == "CMYK":
+        return 4
+    if type_ == "jpegxl" and spec.nchannels == 2:  # grey and alpha, which it calls R and G
+        return 2
+    colours = 3 if spec.nchannels > 2 else 1
+    return colours + ("A" in spec.channelnames[colours : colours + 1])
 
 
 def _count(number: int) -> str:
@@ -191,18 +226,18 @@ def _area(source: Any, number: int) -> int:
 
 def _channels(pixels: Pixels, spec: Any, type_: str) -> Pixels:
     """Channels of a picture that are colour or alpha, with straight alpha."""
+    used = _used(spec, type_)
     if "".join(spec.channelnames[:4]) == "CMYK":
-        return pixels[..., :4]
+        return pixels[..., :used]
     # OpenImageIO turns round only those of 8 bits and less.
-    white_is_zero = spec.getattribute("tiff:PhotometricInterpretation") == 0
-    if white_is_zero and pixels.dtype in (np.uint16, np.uint32):
-        pixels = np.concatenate([~pixels[..., :1], pixels[..., 1:]], axis=2)
-    colours = 3 if spec.nchannels > 2 else 1
-    alpha = "A" in spec.channelnames[colours : colours + 1]
-    pixels = pixels[..., : colours + alpha]
+    if spec.getattribute("tiff:PhotometricInterpretation") == 0 and pixels.dtype != np.uint8:
+        white = 1 if pixels.dtype.kind == "f" else np.iinfo(pixels.dtype).max
+        turned = (white - pixels[..., :1]).astype(pixels.dtype)
+        pixels = np.concatenate([turned, pixels[..., 1:]], axis=2)
+    pixels = pixels[..., :used]
     # A TIFF file without this attribute says that its alpha is premultiplied.
     straight = spec.get_int_attribute("oiio:UnassociatedAlpha")
-    if alpha and not straight and type_ in (*_PREMULTIPLIED, "tiff"):
+    if used in (2, 4) and not straight and type_ in (*_PREMULTIPLIED, "tiff"):
         pixels = _straight(pixels)
     return pixels
 
@@ -213,10 +248,13 @@ def _colour(spec: Any, type_: str, floating: bool, name: str) -> Colour:
     if cicp is not None:
         # Whatever they were in the file: the reader gives RGB, over the full range.
         primaries, transfer = tuple(cicp)[:2]
-        return Colour((int(primaries), int(transfer), 0, 1), icc)
-    if icc:
+        # Grey JPEG XL has no primaries.
+        return Colour((int(primaries) or 1, int(transfer), 0, 1), icc)
+    if icc and not _space(spec).endswith("LAB"):
         return Colour(icc=icc, inks="".join(spec.channelnames[:4]) == "CMYK")
     space = str(spec.getattribute("oiio:ColorSpace") or "")
+    if _space(spec) == "CIELAB" and spec.nchannels == 3 and not floating:
+        return Colour(lab=True)
     silent = type_ == "openexr" and space == ""
     if silent or type_ == "hdr" or (type_ == "pnm" and floating):
         space = "lin_rec709_scene"

@@ -103,8 +103,9 @@ def colour(data: bytes) -> Colour:
     if icc or b"sRGB" in known:
         return Colour(cicp, icc)
     gamma = None
-    if len(known.get(b"gAMA", b"")) == 4:
-        gamma = 1e5 / max(int.from_bytes(known[b"gAMA"], "big"), 1)
+    stated = int.from_bytes(known.get(b"gAMA", b""), "big")
+    if len(known.get(b"gAMA", b"")) == 4 and 1e4 <= stated <= 1e6:  # others make no sense
+        gamma = 1e5 / stated
     chromaticities = SRGB
     if len(known.get(b"cHRM", b"")) == 32:
         x, y, *rest = (v / 1e5 for v in struct.unpack(">8I", known[b"cHRM"]))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 import os
 import tokenize
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -92,6 +92,7 @@ def parse(data: bytes, name: str, *, frame: int | None = None, clip: bool = Fals
     if is_jpeg and colour == color.Colour() and exif.is_adobe_rgb(told.get("exif", b"")):
         colour = color.ADOBE_RGB
     pixels, blocks, notes = color.adopt(source.pixels, colour)
+    notes = [*source.notes, *notes]
     if source.mixed and not source.colour.inks:
         notes.append("converted from CMYK without a profile")
     lost = metadata.left_out(data)
@@ -226,7 +227,7 @@ def write(
     else:
         data, lost = _encode(kind, pixels, blocks)
     write_atomically(path, data)
-    return tuple(_losses(kind, lost))
+    return tuple(losses(kind, lost))
 
 
 def _encode(kind: str, pixels: Pixels, blocks: dict[str, bytes]) -> tuple[bytes, list[str]]:
@@ -242,8 +243,13 @@ def _encode(kind: str, pixels: Pixels, blocks: dict[str, bytes]) -> tuple[bytes,
     return data, lost if follows else [*lost, "icc"]
 
 
-def _losses(kind: str, lost: list[str]) -> list[str]:
-    """Remarks on blocks that a type does not hold."""
+def losses(kind: str, lost: Sequence[str]) -> list[str]:
+    """Remarks for the user on blocks that a type does not hold.
+
+    Args:
+        kind: Suffix of the type.
+        lost: Names of the blocks.
+    """
     notes = []
     told = [name.upper() for name in ("exif", "xmp") if name in lost]
     if told:

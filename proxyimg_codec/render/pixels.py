@@ -70,6 +70,8 @@ def render(
     kind = _sample_type(dtype)
     chosen = selected(picture, layers, background)
     view = make_view(picture.size, width, height, scale, region)
+    if not isinstance(limits, Limits) or not (progress is None or callable(progress)):
+        raise UsageError("limits must be Limits, and progress a function of one number")
     limits.check("output_pixels", view.width * view.height)
     solid = picture.opaque and bool(chosen) and chosen[0] is picture.layers[0]
     with kernel.for_engine(engine), enough_memory("to draw the picture; ask for a smaller one"):

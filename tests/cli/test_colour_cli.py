@@ -2,6 +2,7 @@
 
 import io
 import json
+import re
 
 import numpy as np
 import pytest
@@ -153,6 +154,30 @@ def test_lost_colours_are_said(tool, wide_pxi, tmp_path, suffix):
 @pytest.mark.parametrize("suffix", [".ora", ".svg"])
 def test_layers_are_not_converted(tool, wide_pxi, tmp_path, suffix):
     assert "--srgb" in tool("decode", wide_pxi, tmp_path / f"a{suffix}", "--srgb", code=2).err
+
+
+def test_outlines_have_srgb_colours(tool, tmp_path):
+    skin = np.full((13, 21, 3), (190, 100, 80), np.uint8)
+    image = pxi.encode(skin, effort=1, jobs=1, max_layers=1, blocks={"cicp": DISPLAY_P3})
+    image.save(tmp_path / "in.pxi")
+    ran = tool("decode", tmp_path / "in.pxi", tmp_path / "a.svg")
+    assert "warning" not in ran.err
+    (fill,) = re.findall('fill="#(..)(..)(..)"', (tmp_path / "a.svg").read_text())
+    mean = image.render(dtype="float32").mean((0, 1))
+    wanted = to_numbers(between(P3, SRGB) @ to_light(mean))
+    assert np.abs(wanted - mean).max() > 0.02
+    np.testing.assert_allclose([int(v, 16) / 255 for v in fill], wanted, atol=0.004)
+
+
+@pytest.mark.parametrize("suffix", [".ora", ".svg"])
+def test_lost_metadata_of_layers_is_said(tool, tmp_path, suffix):
+    blocks = {"cicp": DISPLAY_P3, "xmp": b"<x:xmpmeta/>"}
+    image = pxi.encode(ramp(), effort=1, jobs=1, max_layers=1, blocks=blocks)
+    image.save(tmp_path / "in.pxi")
+    ran = tool("decode", tmp_path / "in.pxi", tmp_path / f"a{suffix}")
+    assert ran.err.count("warning") == 1
+    assert f"{suffix} does not take this XMP; left out" in ran.err
+    assert tool("decode", tmp_path / "in.pxi", tmp_path / f"b{suffix}", "--quiet").err == ""
 
 
 def test_types_of_linear_light_have_more_bits_by_default(tool, small_pxi, tmp_path):

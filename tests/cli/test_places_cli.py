@@ -97,6 +97,18 @@ def test_standard_streams_by_name(launch, here):
     assert drawn[:4] == b"\x89PNG"
 
 
+@encoder
+def test_nothing_but_the_picture_goes_to_standard_output_if_standard_error_is_closed(launch, here):
+    png("a.png")
+    closed = {"first": "exec 2>&-"}
+    data = launch("encode", "a.png", "-", *TINY).out
+    assert launch("encode", "a.png", "-", *TINY, **closed).out == data
+    with open("a.pxi", "wb") as file:
+        file.write(data)
+    assert launch("decode", "a.pxi", "-", **closed).out == launch("decode", "a.pxi", "-").out
+    assert launch("edit", "a.pxi", "b.pxi", "--bake", **closed).out == b""
+
+
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no named pipes")
 @pytest.mark.parametrize("words", [("edit", "a.pxi", "pipe"), ("decode", "a.pxi", "pipe")])
 def test_pipes_of_any_name(tool, picture, words):
@@ -270,6 +282,13 @@ def test_odd_suffixes(tool, here, suffix):
     tool("encode", *TINY, f"b{suffix}", f"c{suffix}", code=2)
 
 
+def test_pxi_edit_names_no_flag_that_it_lacks(tool, picture):
+    picture("a.pxi")
+    err = tool("edit", "a.pxi", "b.pxi", "c.pxi", "--hide", "1", code=2).err
+    assert "3 files are too many for IN OUT" in err
+    assert "-o" not in err
+
+
 def test_a_negative_name_needs_no_dashes_in_pxi_edit(tool, picture):
     picture("-5.pxi")
     tool("edit", "-5.pxi", "--move", "-1", "-.5,-3", "-6.pxi")
@@ -394,6 +413,11 @@ def test_an_error_that_names_no_file_gets_its_name(tool, here):
         (("-", "b.png", "-o", "out/"), "standard input"),
         (("/", "b.png", "-o", "out/"), "'/'"),
         (("a.png", "b.png", "-o", "out/", "--masks", "m"), "--masks"),
+        (("a.png", ""), "empty"),
+        (("", "c.pxi"), "empty"),
+        (("a.png", "-o", ""), "empty"),
+        (("a.png", "", "-o", "out/"), "empty"),
+        (("a.png", "c.pxi", "--masks", ""), "empty"),
         (("a.png", "b.png", "-o", "out/", "-q", "101"), "quality"),
         (("-o", "out/"), "IN is missing"),
         ((), "IN is missing"),

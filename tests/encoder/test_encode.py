@@ -7,6 +7,7 @@ import proxyimg_codec as pxi
 from proxyimg_codec.encoder.settings import Settings
 from proxyimg_codec.encoder.shapes.layers import plan_layers
 from proxyimg_codec.encoder.shapes.masks import Region
+from proxyimg_codec.errors import UsageError
 from proxyimg_codec.geometry.coverage import FULL, coverage
 from proxyimg_codec.io.psnr import psnr_8bit
 from proxyimg_codec.render.quality import psnr
@@ -157,6 +158,12 @@ def test_arrays_that_are_no_pictures_are_refused(pixels):
 def test_settings_out_of_range_are_refused(options, photo):
     with pytest.raises(pxi.UsageError):
         pxi.encode(photo, **options)
+
+
+@pytest.mark.parametrize("block", [b"", "text", 7, None])
+def test_metadata_that_is_no_bytes_is_refused(photo, block):
+    with pytest.raises(UsageError, match="metadata block 'exif'"):
+        pxi.encode(photo, blocks={"exif": block}, **FAST)
 
 
 def test_the_file_says_how_it_was_made(photo):

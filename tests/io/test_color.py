@@ -27,7 +27,7 @@ from tests.support.profiles import (
 )
 
 oiio = pytest.importorskip("OpenImageIO")
-pytest.importorskip("imagecodecs")
+imagecodecs = pytest.importorskip("imagecodecs")
 Image = pytest.importorskip("PIL.Image")
 
 PQ = bytes([9, 16, 0, 1])
@@ -260,6 +260,51 @@ def test_nonsense_of_primaries_is_passed_over(number):
     assert adopted(broken).blocks == {}
 
 
+@pytest.mark.parametrize("number", [0, 1, 9_999, 1_000_001, 2**32 - 1])
+def test_nonsense_of_gamma_is_passed_over(number):
+    assert adopted((b"gAMA", struct.pack(">I", number))).blocks == {}
+
+
+# CIE L*a*b*
+
+LAB = [(100, 0, 0), (0, 0, 0), (53.585, 0, 0), (54.29, 80.81, 69.89), (29.57, 68.3, -112.03)]
+"""White, black, middle grey, and the red and the blue of sRGB, at D50."""
+
+LOOKS = [(1, 1, 1), (0, 0, 0), (0.5, 0.5, 0.5), (1, 0, 0), (0, 0, 1)]
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+@pytest.mark.parametrize("order", "<>")
+def test_lab_is_converted(tmp_path, dtype, order):
+    top, steps = (255, 1) if dtype == np.uint8 else (65535, 256)
+    lab = np.rint(np.array([LAB]) * (top / 100, steps, steps))
+    (tmp_path / "a.tif").write_bytes(tiff_of(lab.astype(np.int64).astype(dtype), order, t262=8))
+    picture = read(tmp_path / "a.tif")
+    np.testing.assert_allclose(picture.pixels, [LOOKS], atol=0.02 if steps == 1 else 0.002)
+    assert picture.notes == ("converted from CIE L*a*b* to sRGB",)
+    assert picture.blocks == {}
+
+
+@pytest.mark.parametrize("kind", [9, 10])
+def test_other_kinds_of_lab_are_refused(tmp_path, kind):
+    (tmp_path / "a.tif").write_bytes(tiff_of(colours(), t262=kind))
+    with pytest.raises((InputError, UnsupportedError), match=r"a\.tif: "):
+        read(tmp_path / "a.tif")
+
+
+# Grey
+
+
+@pytest.mark.parametrize("alpha", [False, True])
+def test_grey_jpeg_xl_keeps_its_numbers(tmp_path, alpha):
+    grey = colours(31, 23)[..., : 1 + alpha]
+    (tmp_path / "a.jxl").write_bytes(imagecodecs.jpegxl_encode(grey, lossless=True))
+    picture = read(tmp_path / "a.jxl")
+    assert picture.notes == ()
+    assert picture.blocks == {}
+    np.testing.assert_array_equal(picture.pixels, grey)
+
+
 # Profiles
 
 
@@ -461,9 +506,8 @@ def test_converting_needs_imagecodecs(tmp_path, monkeypatch):
 
 
 def test_white_is_zero_in_files_of_any_depth(tmp_path):
-    for dtype in (np.uint8, np.uint16):
-        top = np.iinfo(dtype).max
-        grey = np.arange(12, dtype=dtype).reshape(3, 4, 1) * dtype(top // 12)
+    for dtype, top in ((np.uint8, 255), (np.uint16, 65535), (np.float32, 1)):
+        grey = (np.arange(12).reshape(3, 4, 1) * (top / 12)).astype(dtype)
         (tmp_path / "a.tif").write_bytes(tiff_of(grey, t262=0))
         np.testing.assert_array_equal(read(tmp_path / "a.tif").pixels, top - grey)
 

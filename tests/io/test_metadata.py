@@ -278,6 +278,9 @@ def test_what_is_neither_exif_nor_xmp_is_named():
     assert metadata.left_out(JPEG) == []
     assert metadata.left_out(tiff_of(PIXELS, t33723=7)) == ["IPTC"]
     assert metadata.left_out(tiff_of(PIXELS)) == []
+    gif, xmp = saved("gif"), b"!\xff\x0bXMP DataXMP<x:xmpmeta/>\1\xff\xfe\0\0"
+    assert parse(gif[:-1] + xmp + b";", "a.gif").notes == ("XMP: left out",)
+    assert parse(gif, "a.gif").notes == ()
 
 
 def test_boxes_that_are_open_ended_or_long(tmp_path):

@@ -50,8 +50,8 @@ def save(path, pixels, **attributes):
     kind = {"float32": "float"}.get(str(pixels.dtype), str(pixels.dtype))
     spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], kind)
     for name, value in attributes.items():
-        if name == "channelnames":
-            spec.channelnames = value
+        if hasattr(spec, name):
+            setattr(spec, name, value)
         elif isinstance(value, bytes):
             array = np.frombuffer(value, np.uint8)
             spec.attribute(name, oiio.TypeDesc(f"uint8[{len(array)}]"), array)
@@ -412,10 +412,35 @@ def test_cmyk_becomes_rgb(tmp_path):
     assert picture.notes == ("converted from CMYK without a profile",)
 
 
-def test_further_channels_are_left_out(tmp_path):
-    pixels = noise(5)
-    pixels[..., 3] = 255
-    np.testing.assert_array_equal(read(save(tmp_path / "a.tif", pixels)).pixels, pixels[..., :4])
+def test_inks_of_ycck_are_said_too(tmp_path):
+    imagecodecs = pytest.importorskip("imagecodecs")
+    light = np.full((16, 16, 4), 255, np.uint8)
+    light[..., 1:3] = 0  # as Adobe stores inks: magenta and yellow make red
+    data = imagecodecs.jpeg8_encode(light, 95, colorspace="CMYK", outcolorspace="YCCK")
+    picture = parse(data, "a.jpg")
+    np.testing.assert_allclose(picture.pixels[8, 8], RED, atol=3)
+    assert picture.notes == ("converted from CMYK without a profile",)
+
+
+@pytest.mark.parametrize(
+    ("channels", "kept", "named"), [(2, 1, "G"), (5, 4, "channel4"), (14, 4, "channel11, ...")]
+)
+def test_further_channels_are_left_out_and_named(tmp_path, channels, kept, named):
+    pixels = np.repeat(noise(2), channels, axis=2)[..., :channels]
+    pixels[..., 3:4] = 255
+    picture = read(save(tmp_path / "a.tif", pixels, oiio__UnassociatedAlpha=1))
+    np.testing.assert_array_equal(picture.pixels, pixels[..., :kept])
+    assert [note.endswith(named) for note in picture.notes] == [True]
+
+
+def test_depth_and_the_display_window_of_openexr_are_named(tmp_path):
+    names = ("R", "G", "B", "Z", "diffuse.R")
+    path = save(tmp_path / "a.exr", np.zeros((6, 9, 5), np.float32), channelnames=names,
+                x=3, y=-2, full_width=20, full_height=10)  # fmt: skip
+    picture = read(path)
+    assert picture.pixels.shape == (6, 9, 3)
+    assert "channels left out: Z, diffuse.R" in picture.notes
+    assert any("9x6 at 3,-2" in v and "20x10 at 0,0" in v for v in picture.notes)
 
 
 @pytest.mark.parametrize("name", ["a.\0png", "a." + "x" * 300, "a.\u732b", "a.\udcff", "a.\n", "-"])

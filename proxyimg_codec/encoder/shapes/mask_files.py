@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageOps
+from PIL import Image, ImageOps, UnidentifiedImageError
 
 from ...errors import InputError
 from ...io.names import is_picture
@@ -136,6 +136,8 @@ def _read(path: Path, width: int, height: int) -> _File:
         file = _opened(data, (width, height))
     except MemoryError:
         raise
+    except UnidentifiedImageError:
+        raise InputError(f"{path}: the mask is no valid picture; save it as PNG") from None
     except Exception as error:
         # Pillow's readers raise errors of any class.
         raise InputError(

@@ -277,7 +277,7 @@ def test_unusable_paths_are_refused_by_name(tmp_path):
     for data in (b"", b"hello", b"\x89PNG\r\n\x1a\n broken", whole[:60], b"\x93NUMPY\1\0"):
         (tmp_path / "a.png").write_bytes(data)
         for path in (tmp_path, tmp_path / "a.png"):
-            with pytest.raises(InputError, match=r"a\.png: the mask is no valid picture"):
+            with pytest.raises(InputError, match=r"a\.png: the mask is no valid picture(?!.*0x)"):
                 load(path)
 
 
