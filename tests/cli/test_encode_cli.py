@@ -423,7 +423,7 @@ def test_unusable_outputs(tool, photo_png, tmp_path):
     tool("encode", photo_png, photo_png, "--force", code=2)
     tool("encode", photo_png, tmp_path / "missing" / "a.pxi", code=3)
     tool("encode", photo_png, tmp_path, "--force", code=3)
-    tool("encode", photo_png, "", code=3)
+    tool("encode", photo_png, "", code=2)
     tool("encode", photo_png, tmp_path / f"{'x' * 300}.pxi", code=3)
     tool("encode", photo_png, "-", "--json", code=2)
     assert photo_png.read_bytes() == before
