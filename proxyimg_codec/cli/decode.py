@@ -66,6 +66,7 @@ def arguments() -> argparse.ArgumentParser:
     add_limits(p)
     add("-f", "--force", action="store_true", help="replace files that exist")
     add("--quiet", action="store_true", help="print nothing but errors")
+    p.set_defaults(prog="pxi-decode")
     return p
 
 
@@ -295,7 +296,7 @@ def render(image: Any, output: str, args: argparse.Namespace) -> None:
 def remark(args: argparse.Namespace, output: str, notes: Iterable[str]) -> None:
     """Prints warnings about an output, unless --quiet."""
     for note in () if args.quiet else notes:
-        print(f"pxi-decode: warning: {printable(output)}: {note}", file=sys.stderr)
+        print(f"{args.prog}: warning: {printable(output)}: {note}", file=sys.stderr)
 
 
 def layered(image: Any, output: str, kind: str, args: argparse.Namespace) -> None:

@@ -106,7 +106,7 @@ def _draw(args: argparse.Namespace, picture: Picture) -> None:
     from . import decode
 
     flags = decode.arguments().parse_args([f"--limit={v}" for v in args.limit])
-    flags.quiet = args.quiet
+    flags.quiet, flags.prog = args.quiet, "pxi-edit"
     decode.draw(Image(picture), args.output, flags)
 
 

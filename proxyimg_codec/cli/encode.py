@@ -239,7 +239,8 @@ def encoded(source: bytes, args: argparse.Namespace, settings: Any, bar: Bar) ->
             layered = replace(layered, blocks={})
         image, kept = encode_layers(layered, settings, progress)
         for layer in () if args.quiet else kept.left_out:
-            print(f"{name}: layer {layer!r} has nothing to be seen; left out", file=sys.stderr)
+            print(f"pxi-encode: warning: {printable(name)}: layer {layer!r} has nothing to be "
+                  "seen; left out", file=sys.stderr)  # fmt: skip
         return image, composite(layered)
     picture = parse(source, name, frame=args.frame, clip=args.tone == "clip")
     picture = stripped(picture) if args.strip else picture

@@ -234,3 +234,12 @@ def test_a_drag_says_what_it_does_where_one_might_not_expect_it(tool, work):
             assert phrase in line
         quiet = tool("edit", path, work / "out.pxi", "-f", "--drag", "disc", *handles, "--quiet")
         assert quiet.err == ""
+
+
+def test_what_a_drawn_picture_cannot_hold_is_said_by_the_tool_that_was_called(tool, tmp_path):
+    pixels = np.full((9, 13, 3), 90, np.uint8)
+    image = pxi.encode(pixels, effort=1, blocks={"xmp": b"<x:xmpmeta xmlns:x='adobe:ns:meta/'/>"})
+    image.save(tmp_path / "a.pxi")
+    ran = tool("edit", tmp_path / "a.pxi", tmp_path / "a.ppm", "--opacity", "0", "1")
+    assert "pxi-edit: warning: " in ran.err
+    assert "pxi-decode" not in ran.err
