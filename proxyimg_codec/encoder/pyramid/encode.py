@@ -127,13 +127,15 @@ class _Job:
             latents that must be 0; None = all 1.
         latents: Latents of levels 1, 2, ..., then the lowest planes.
         shifts: Shifts of the scale index.
+        grid: Sizes of the planes.
         count: Number of levels.
     """
 
     def __init__(self, model: Model, raster: Raster, step: int) -> None:
         self.model, self.raster, self.step_index = model, raster, step
         self.step = torch.tensor([2.0 ** (step / 64)])
-        self.count = levels_for(raster.size)
+        self.grid = Grid(raster.size, levels_for(raster.size))
+        self.count = self.grid.levels
         self.picture = _tensor(raster.samples.transpose(2, 0, 1))
         self.weight = None if raster.weight is None else _tensor(raster.weight[None])
         self.support = self._support()
@@ -148,7 +150,7 @@ class _Job:
         cells = np.ones(coded.cells_of(r.size, CELL), bool) if r.cells is None else r.cells
         masks = []
         for level in range(1, self.count + 1):
-            mask = by_channel(Grid(r.size, self.count).bands(cells, CELL, level))
+            mask = by_channel(self.grid.bands(cells, CELL, level))
             mask[3:] &= not r.grey
             masks.append(_tensor(mask.astype(np.float32)))
         lowest = np.ones((3, *mask.shape[1:]), np.float32)
@@ -158,8 +160,7 @@ class _Job:
     @torch.no_grad()
     def _analysed(self) -> list[Tensor]:
         """Latents by the analysis, window by window."""
-        grid = Grid(self.raster.size, self.count)
-        shapes = [grid.at(level) for level in self._depths()]
+        shapes = [self.grid.at(level) for level in self._depths()]
         found = [torch.zeros(1, 9, *shape) for shape in shapes[:-1]]
         found.append(torch.zeros(1, 3, *shapes[-1]))
         for box in self.windows(REACH):

@@ -18,7 +18,6 @@ from .wavelet import (
     analysis_weights,
     extended,
     merged,
-    missing,
     reflected,
     synthesis_weights,
 )
@@ -116,7 +115,9 @@ class Model(nn.Module):
             levels: Number of levels.
 
         Returns:
-            Latents [B, 9, h, w] of levels 1, 2, ..., then the lowest planes [B, 3, h, w].
+            Latents [B, 9, h, w] of levels 1, 2, ..., then the lowest planes [B, 3, h, w]. Where a
+            level halves an odd number of samples, those that `Grid.bands` does not have are to be
+            replaced by 0.
         """
         scale = step.view(-1, 1, 1, 1)
         q = log_step(step)
@@ -257,7 +258,7 @@ class Level(nn.Module):
         parts = cells.view(cells.shape[0], 3, 4, *cells.shape[2:])
         parts = (parts - parts.mean(2, keepdim=True)).flatten(1, 2)
         out = linear + self.analysis(soft(parts), q, self.fast)
-        return out[:, :3], out[:, 3:] * missing(out[:, 3:], low.shape[2:])
+        return out[:, :3], out[:, 3:]
 
     def synthesise(self, low: Tensor, high: Tensor, q: Tensor, size: Size) -> Tensor:
         """Merges planes [B, 3, h, w] and bands [B, 9, h, w] into finer planes [B, 3, *size].

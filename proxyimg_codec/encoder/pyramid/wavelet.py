@@ -86,12 +86,3 @@ def extended(low: Tensor, high: Tensor, size: Size) -> Tensor:
 def merged(cells: Tensor, size: Size) -> Tensor:
     """Planes [B, C, *size] of which `cells` [B, 4 C, h, w] has 2 x 2 samples a position."""
     return F.pixel_shuffle(cells, 2)[:, :, : size[0], : size[1]]
-
-
-def missing(high: Tensor, size: Size) -> Tensor:
-    """Mask [1, 9, h, w] of bands [B, 9, h, w]: 0 for those that planes of `size` do not have."""
-    mask = torch.ones(1, 3, *high.shape[2:])
-    for band, (v, h) in enumerate(BANDS):
-        mask[:, band, size[0] // 2 :] *= 1 - v
-        mask[:, band, :, size[1] // 2 :] *= 1 - h
-    return mask.repeat(1, 3, 1, 1)

@@ -128,8 +128,7 @@ def _array(values: Any, name: str, height: int, width: int) -> NDArray[Any]:
     expected = EXPECTED.format(h=height, w=width)
     try:
         mask = np.asarray(values)
-    except Exception:
-        # What makes an array of itself may fail in any way.
+    except Exception:  # what makes an array of itself may fail in any way
         mask = np.empty(0, object)
     if mask.dtype.kind not in "biuf" or mask.ndim != 2:
         kind = type(values).__name__ if mask.dtype.kind not in "biuf" else f"shape {mask.shape}"
