@@ -144,7 +144,7 @@ def read_openraster(data: bytes, name: str, limits: Limits = DEFAULT_LIMITS) -> 
 def _opened(data: bytes, name: str) -> zipfile.ZipFile:
     try:
         return zipfile.ZipFile(io.BytesIO(data))
-    except (zipfile.BadZipFile, NotImplementedError, ValueError, struct.error) as error:  # newer ZIP
+    except (zipfile.BadZipFile, NotImplementedError, ValueError, struct.error) as error:  # new ZIP
         raise InputError(f"{name}: not an OpenRaster file ({error})") from None
 
 
