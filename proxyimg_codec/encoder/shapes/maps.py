@@ -1,0 +1,79 @@
+"""Maps of a picture by the layers network: what stands out, where its edges are, who is in front.
+
+The network (`models/layers-1.onnx`; `training/layers.py` makes it) sees the picture at two sizes. What
+stands out is judged as a whole, in a small copy; edges are found in a larger one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float32]
+
+MODEL = "layers-1.onnx"
+
+MULTIPLE = 32
+"""Sides of what the network sees are multiples of this."""
+
+SMALL, LARGE = 384, 768
+"""Longer side, in pixels, of the copies in which figures and boundaries are sought."""
+
+
+@dataclass(frozen=True, eq=False)
+class Maps:
+    """Maps of a picture, at its size.
+
+    Attributes:
+        figure: float32 [H, W] in 0..1, how much a pixel belongs to what stands out.
+        boundary: float32 [H, W] in 0..1, how likely a pixel lies on the edge of an object.
+        owner: float32 [H, W, 2], at edges: direction x, y towards the side that is in front; its
+            length, about 0..1, is the confidence.
+    """
+
+    figure: Floats
+    boundary: Floats
+    owner: Floats
+
+
+def find_maps(rgb: NDArray[np.uint8], jobs: int = 1) -> Maps:
+    """Runs the layers network on a picture.
+
+    Args:
+        rgb: uint8 [H, W, 3] picture in sRGB.
+        jobs: Threads to use.
+    """
+    small = _run(rgb, SMALL, jobs)
+    large = _run(rgb, LARGE, jobs)
+    return Maps(small[0], large[1], np.ascontiguousarray(large[2:].transpose(1, 2, 0)))
+
+
+def _run(rgb: NDArray[np.uint8], side: int, jobs: int) -> Floats:
+    """Maps float32 [4, H, W] from a copy of the picture with a longer side of at most `side`."""
+    height, width = rgb.shape[:2]
+    scale = min(1.0, side / max(height, width))
+    high, wide = max(1, round(height * scale)), max(1, round(width * scale))
+    copy = cv2.resize(rgb, (wide, high), interpolation=cv2.INTER_AREA)
+    pad = (-high % MULTIPLE, -wide % MULTIPLE)
+    copy = cv2.copyMakeBorder(copy, 0, pad[0], 0, pad[1], cv2.BORDER_REPLICATE)
+    planes = copy.astype(np.float32).transpose(2, 0, 1)[None] / 255
+    found = _session(jobs).run(None, {"rgb": planes})[0][0, :, :high, :wide]
+    return np.stack([cv2.resize(plane, (width, height)) for plane in found])
+
+
+@cache
+def _session(jobs: int) -> Any:
+    import onnxruntime
+
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = jobs
+    options.inter_op_num_threads = 1
+    options.log_severity_level = 3
+    model = (resources.files("proxyimg_codec.models") / MODEL).read_bytes()
+    return onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
