@@ -1,7 +1,7 @@
 """Maps of a picture by the layers network: what stands out, where its edges are, who is in front.
 
-The network (`models/layers-1.onnx`; `training/layers.py` makes it) sees the picture at two sizes. What
-stands out is judged as a whole, in a small copy; edges are found in a larger one.
+The network (`models/layers-1.onnx.zst`; `training/layers.py` makes it) sees the picture at two sizes.
+What stands out is judged as a whole, in a small copy; edges are found in a larger one.
 """
 
 from __future__ import annotations
@@ -13,11 +13,12 @@ from typing import Any
 
 import cv2
 import numpy as np
+import zstandard
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float32]
 
-MODEL = "layers-1.onnx"
+MODEL = "layers-1.onnx.zst"
 
 MULTIPLE = 32
 """Sides of what the network sees are multiples of this."""
@@ -75,5 +76,6 @@ def _session(jobs: int) -> Any:
     options.intra_op_num_threads = jobs
     options.inter_op_num_threads = 1
     options.log_severity_level = 3
-    model = (resources.files("proxyimg_codec.models") / MODEL).read_bytes()
+    packed = (resources.files("proxyimg_codec.models") / MODEL).read_bytes()
+    model = zstandard.decompress(packed)
     return onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])

@@ -11,21 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .masks import Region, description, nearness, unique_names
+from .refine import Image, Labels, Mask, reduced_lab, refined, spread
 
 Floats = NDArray[np.float64]
-Image = NDArray[np.float32]
-Labels = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 
-WORK_SIDE, REFINE_SIDE, SUPERPIXELS = 256, 640, 360
+WORK_SIDE, SUPERPIXELS = 256, 360
 MIN_SIDE, MIN_AREA = 12, 0.01
 # Weights that bring the features of superpixels to the scale of distances in Lab.
 LIGHTNESS, TEXTURE, SALIENCY = 0.7, 4.0, 60.0
 # Cost of a merge: weight of the edge, powers of size and of border length, factor for regions that
 # do not touch; and the cost above which two regions stay apart.
 EDGE, SIZE_POWER, BORDER, APART, KEEP = 0.1, 0.5, 0.6, 3.0, 50.0
-# Refinement of borders: lengths are pixels at WORK_SIDE; the guide is Lab / 100.
-GUIDE_RADIUS, GUIDE_EPS, SMOOTH = 3, 1e-4, 1.5
 
 
 def segment(
@@ -47,11 +43,11 @@ def segment(
     whole = np.ones(rgb.shape[:2], np.bool_) if support is None else support
     if not whole.any():
         return []
-    small, inside = _reduced(rgb, whole, WORK_SIDE)
+    small, inside = reduced_lab(rgb, whole, WORK_SIDE)
     labels, salient = np.zeros(inside.shape, np.intp), np.zeros(inside.shape)
     if min(small.shape[:2]) >= MIN_SIDE and inside.any():
         labels, salient = _merged(small, inside, max_layers, opaque=support is None)
-    full = _refined(_spread(labels), rgb, whole)
+    full = refined(spread(labels), rgb, whole)
     masks = {i: whole & (full == i) for i in range(int(labels.max()) + 1)}
     salience = {i: float(salient[labels == i].mean()) for i in masks if masks[i].any()}
     # Ascending nearness is back to front.
@@ -61,26 +57,6 @@ def segment(
         names[0] = "back"
     stack = zip(unique_names(names), back_to_front, strict=True)
     return [Region(name, masks[i]) for name, i in stack]
-
-
-def _reduced(rgb: NDArray[np.uint8], support: Mask, side: int) -> tuple[Image, Mask]:
-    """Reduces a picture to at most `side` pixels a side.
-
-    Colours outside the support are arbitrary, so they are left out of every average.
-
-    Returns:
-        float32 [h, w, 3] picture in Lab, and bool [h, w] support.
-    """
-    height, width = support.shape
-    scale = min(1.0, side / max(height, width))
-    size = (max(1, round(width * scale)), max(1, round(height * scale)))
-    weight = cv2.resize(support.astype(np.float32), size, interpolation=cv2.INTER_AREA)
-    visible = np.where(support[..., None], rgb, np.uint8(0))
-    sums = cv2.resize(visible, size, interpolation=cv2.INTER_AREA)
-    mean = sums.sum((0, 1)) / weight.sum()
-    small = np.where(weight[..., None] > 0, sums / np.maximum(weight, 1e-6)[..., None], mean)
-    lab = cv2.cvtColor((small / 255).astype(np.float32), cv2.COLOR_RGB2LAB)
-    return np.asarray(lab, np.float32), weight >= 0.5
 
 
 def _merged(lab: Image, inside: Mask, max_layers: int, opaque: bool) -> tuple[Labels, Floats]:
@@ -257,42 +233,3 @@ class _Merger:
                 break
             self.merge(i, j)
         return np.unique(self.group, return_inverse=True)[1]
-
-
-def _spread(labels: Labels) -> Labels:
-    """Gives each pixel with label -1 the label of the nearest pixel that has one."""
-    missing = labels < 0
-    _, nearest = cv2.distanceTransformWithLabels(
-        missing.astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    of_pixel = np.zeros(int(nearest.max()) + 1, np.intp)
-    of_pixel[nearest[~missing]] = labels[~missing]
-    return np.asarray(of_pixel[nearest])
-
-
-def _refined(labels: Labels, rgb: NDArray[np.uint8], support: Mask) -> Labels:
-    """Enlarges labels to the size of the picture, with smooth borders that follow its edges.
-
-    Args:
-        labels: int [h, w] labels from 0.
-        rgb: uint8 [H, W, 3] picture.
-        support: bool [H, W] pixels whose colours count.
-
-    Returns:
-        int [H, W] labels.
-    """
-    height, width = rgb.shape[:2]
-    count = int(labels.max()) + 1
-    if count == 1:
-        return np.zeros((height, width), np.intp)
-    guide = _reduced(rgb, support, REFINE_SIDE)[0] / 100
-    size, unit = guide.shape[1::-1], max(guide.shape) / WORK_SIDE
-    best = np.full((height, width), -1, np.float32)
-    full = np.zeros((height, width), np.intp)
-    for label in range(count):
-        vote = cv2.resize((labels == label).astype(np.float32), size)
-        vote = cv2.ximgproc.guidedFilter(guide, vote, max(2, round(GUIDE_RADIUS * unit)), GUIDE_EPS)
-        vote = cv2.resize(cv2.GaussianBlur(vote, (0, 0), SMOOTH * unit), (width, height))
-        full[vote > best] = label
-        best = np.maximum(best, vote)
-    return full
