@@ -121,7 +121,8 @@ def _kept(
     figures = cv2.connectedComponents((labels > 0).astype(np.uint8), connectivity=4)[1]
     whole = np.bincount(figures.ravel())
     most = max_layers - 1 if inside is None else max_layers
-    while (count := int(labels.max())) > 0:
+    least = 0 if inside is None else 1  # what is visible belongs to some layer
+    while (count := int(labels.max())) > least:
         area = np.bincount(labels.ravel(), minlength=count + 1)[1:]
         weight = np.bincount(labels.ravel(), figure.ravel(), count + 1)[1:]
         of_figure = np.zeros(count + 1, np.intp)
@@ -142,7 +143,7 @@ def _without(labels: Labels, worst: int, boundary: Floats, keep: bool) -> Labels
         labels: int [h, w], parts from 1, 0 elsewhere.
         worst: The part.
         boundary: float32 [h, w].
-        keep: Whether a part without neighbours joins the nearest one, if there is any.
+        keep: Whether a part without neighbours joins the nearest one.
     """
     pairs, lengths, sums = borders(labels, boundary)
     beside = (pairs == worst).any(1) & (pairs > 0).all(1)
@@ -150,11 +151,9 @@ def _without(labels: Labels, worst: int, boundary: Floats, keep: bool) -> Labels
     if beside.any():
         best = int(np.where(beside, sums / lengths, np.inf).argmin())
         target = int(pairs[best].sum()) - worst
-    elif keep and labels.max() > 1:
+    elif keep:
         others = spread(np.where((labels > 0) & (labels != worst), labels, -1))
         target = int(np.bincount(others[labels == worst]).argmax())
-    elif keep:
-        return np.where(labels > 0, 1, 0) if labels.max() == 1 else labels
     joined = np.where(labels == worst, target, labels)
     return joined - (joined > worst)
 
