@@ -68,7 +68,7 @@ class Hierarchy:
         return np.asarray(self.of_basins(level)[self.basins])
 
 
-def hierarchy(boundary: Floats, inside: NDArray[np.bool_] | None = None) -> Hierarchy:
+def hierarchy(boundary: Floats, inside: NDArray[np.bool_] | None = None, look: Floats | None = None) -> Hierarchy:
     """Divides a picture.
 
     Args:
@@ -78,7 +78,7 @@ def hierarchy(boundary: Floats, inside: NDArray[np.bool_] | None = None) -> Hier
     if inside is not None:
         boundary = np.where(inside, boundary, np.float32(1))
     basins = _basins(boundary)
-    return merged(basins, boundary)
+    return merged(basins, boundary, look=look)
 
 
 def _basins(boundary: Floats) -> Labels:
@@ -130,7 +130,7 @@ def borders(labels: Labels, boundary: Floats) -> tuple[Labels, Labels, Floats]:
     return np.stack(np.divmod(pairs, count), 1), lengths, sums
 
 
-def merged(basins: Labels, boundary: Floats, kinds: Labels | None = None) -> Hierarchy:
+def merged(basins: Labels, boundary: Floats, kinds: Labels | None = None, look: Floats | None = None) -> Hierarchy:
     """Merges regions across the weakest boundary until none is left.
 
     Args:
@@ -145,12 +145,18 @@ def merged(basins: Labels, boundary: Floats, kinds: Labels | None = None) -> Hie
     count = int(basins.max()) + 1
     area = np.bincount(basins.ravel(), minlength=count).tolist() + [0] * count
     least = SMALL * basins.size
+    sums_of = np.zeros((2 * count, 0 if look is None else look.shape[2]))
+    if look is not None:
+        for c in range(look.shape[2]):
+            sums_of[:count, c] = np.bincount(basins.ravel(), look[..., c].ravel(), count)
+    seen = sums_of.tolist()
     near: list[dict[int, tuple[int, float]]] = [{} for _ in range(2 * count)]
 
     def cost(a: int, b: int) -> float:
         length, total = near[a][b]
         share = min(1.0, min(area[a], area[b]) / least)
-        return float(total / length * share**SMALL_POWER)
+        away = sum(abs(p / area[a] - q / area[b]) for p, q in zip(seen[a], seen[b], strict=True))
+        return float((total / length + away) * share**SMALL_POWER)
 
     for (a, b), length, total in zip(pairs.tolist(), lengths.tolist(), sums.tolist(), strict=True):
         near[a][b] = near[b][a] = (length, total)
@@ -166,6 +172,7 @@ def merged(basins: Labels, boundary: Floats, kinds: Labels | None = None) -> Hie
         highest = max(highest, strength)
         strengths.append(highest)
         area[new] = area[a] + area[b]
+        seen[new] = [p + q for p, q in zip(seen[a], seen[b], strict=True)]
         joined = {n: near[a].get(n, (0, 0.0)) for n in {**near[a], **near[b]} if n not in (a, b)}
         for other, (length, total) in joined.items():
             more = near[b].get(other, (0, 0.0))
