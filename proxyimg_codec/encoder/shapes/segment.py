@@ -51,7 +51,7 @@ def segment(
     labels, salient = np.zeros(inside.shape, np.intp), np.zeros(inside.shape)
     if min(small.shape[:2]) >= MIN_SIDE and inside.any():
         labels, salient = _merged(small, inside, max_layers, opaque=support is None)
-    full = _refined(_spread(labels), rgb, whole)
+    full = refined(_spread(labels), rgb, whole)
     masks = {i: whole & (full == i) for i in range(int(labels.max()) + 1)}
     salience = {i: float(salient[labels == i].mean()) for i in masks if masks[i].any()}
     # Ascending nearness is back to front.
@@ -270,7 +270,7 @@ def _spread(labels: Labels) -> Labels:
     return np.asarray(of_pixel[nearest])
 
 
-def _refined(labels: Labels, rgb: NDArray[np.uint8], support: Mask) -> Labels:
+def refined(labels: Labels, rgb: NDArray[np.uint8], support: Mask) -> Labels:
     """Enlarges labels to the size of the picture, with smooth borders that follow its edges.
 
     Args:
