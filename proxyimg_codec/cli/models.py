@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import shlex
 import sys
 from pathlib import Path
@@ -117,7 +118,7 @@ def check_model(args: argparse.Namespace) -> None:
 
     paths = [p for name in args.model for p in locate(name)]
     trial = tried(paths)
-    use = USES[trial.purpose].format(shlex.quote(":".join(str(p) for p in paths)))
+    use = USES[trial.purpose].format(shlex.quote(os.pathsep.join(str(p) for p in paths)))
     sums = {str(p): sha256(p) for p in paths}
     if args.json:
         print(json.dumps({**asdict(trial), "use": use, "sha256": sums}, indent=2))

@@ -72,7 +72,8 @@ def find(kind: str, name: str) -> Any:
     for entry in _added(kind):
         if entry.name == name:
             return _loaded(kind, entry)
-    raise UsageError(f"{kind}: {name!r} is unknown; there are {', '.join(names(kind))}")
+    there = ", ".join(names(kind)) or "none"
+    raise UsageError(f"{kind}: {name!r} is unknown; there are {there}")
 
 
 def _loaded(kind: str, entry: EntryPoint) -> Any:

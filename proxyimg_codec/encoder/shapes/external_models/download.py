@@ -52,7 +52,8 @@ def download(file: File, folder: Path, progress: Progress = lambda done, total: 
     try:
         total = _fetch(file.address, part, tag, progress)
     except (error.URLError, http.client.HTTPException, TimeoutError, ConnectionError) as problem:
-        reason = getattr(problem, "reason", None) or problem
+        told = problem if isinstance(problem, error.HTTPError) else None  # with its number
+        reason = told or getattr(problem, "reason", None) or problem
         raise InputError(f"{file.address}: cannot be downloaded: {reason}; run it again to go on, "
                          "or download it with a browser") from None  # fmt: skip
     size = part.stat().st_size
@@ -81,6 +82,7 @@ def _fetch(address: str, part: Path, tag: Path, progress: Progress) -> int | Non
     try:
         answer = request.urlopen(request.Request(address, headers=headers), timeout=PATIENCE)
     except error.HTTPError as problem:
+        problem.close()
         if not begun or problem.code != 416:  # 416: there is nothing after what is here
             raise
         part.unlink()

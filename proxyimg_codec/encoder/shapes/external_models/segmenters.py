@@ -30,6 +30,12 @@ Depth = Callable[[NDArray[np.uint8]], Floats]
 LEAST, MOST = 0.01, 0.85
 """Least and most share of the picture of a mask that becomes a layer."""
 
+CLEAR = 128
+"""Grey that models see where a picture is clear."""
+
+FRAME = 0.5
+"""Share of the picture's frame from which on a mask is the back, no object."""
+
 INSIDE = 0.8
 """Share of a mask in another from which on it is a part of it, chosen after whole objects."""
 
@@ -83,9 +89,9 @@ def _paths(name: str, kind: str) -> list[Path]:
 def _checked_depth(depth: Depth, name: str, rgb: NDArray[np.uint8]) -> Floats:
     """Map of a plug-in, if it is one."""
     found = np.asarray(depth(rgb), np.float32)
-    check_size(f"the depth of {name}", found, rgb.shape[1], rgb.shape[0])
     if found.ndim != 2 or not np.isfinite(found).all():
         raise InputError(f"the depth of {name} must be one finite number for each pixel")
+    check_size(f"the depth of {name}", found, rgb.shape[1], rgb.shape[0])
     return found
 
 
@@ -99,6 +105,8 @@ def _by_model(
     """Segmenter that a model makes, of saliency or of the SAM family."""
     if support is not None and not support.any():
         return []
+    if support is not None:  # colours of what is clear mean nothing
+        rgb = np.where(support[..., None], rgb, np.uint8(CLEAR))
     kind = kind_of(load(paths[0], jobs))
     if kind in (Kind.U2NET, Kind.ISNET):
         figure = figure_map(load(paths[0], jobs), rgb)
@@ -131,7 +139,8 @@ def regions_of_masks(
     """
     shape = found[0].mask.shape if found else (1, 1)
     labels = np.zeros(shape, np.intp)
-    chosen = _chosen([f for f in found if LEAST <= f.mask.mean() <= MOST], max_layers - 1)
+    objects = [f for f in found if LEAST <= f.mask.mean() <= MOST and _frame(f.mask) < FRAME]
+    chosen = _chosen(objects, max_layers - 1)
     # Smaller ones are drawn over larger ones, of which they may be parts.
     for number, one in enumerate(sorted(chosen, key=lambda f: -int(f.mask.sum())), 1):
         labels[one.mask] = number
@@ -156,10 +165,13 @@ def _chosen(found: list[Found], most: int) -> list[Found]:
 
 def _worth(one: Found) -> float:
     """Worth of a mask as a layer."""
-    mask = one.mask
-    rim = [mask[0], mask[-1], mask[:, 0], mask[:, -1]]
-    frame = sum(int(v.sum()) for v in rim) / (2 * sum(mask.shape))
-    return float(mask.mean() ** 0.5 * one.quality * (1 - frame))
+    return float(one.mask.mean() ** 0.5 * one.quality * (1 - _frame(one.mask)))
+
+
+def _frame(mask: Mask) -> float:
+    """Share of the frame of the picture that a mask covers."""
+    rim = (mask[0], mask[-1], mask[:, 0], mask[:, -1])
+    return sum(int(side.sum()) for side in rim) / (2 * sum(mask.shape))
 
 
 def _shared(a: Mask, b: Mask) -> float:
