@@ -42,6 +42,7 @@ def arguments() -> argparse.ArgumentParser:
     get.add_argument("-f", "--force", action="store_true", help="replace files that are there")
     get.add_argument("--quiet", action="store_true", help="print nothing but errors")
     for action in (listed, check, get):
+        action.epilog, action.formatter_class = p.epilog, p.formatter_class
         action.add_argument("--json", action="store_true", default=argparse.SUPPRESS,
                             help="print JSON")  # fmt: skip
     return p
