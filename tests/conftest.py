@@ -21,7 +21,7 @@ from tests.support.tools import Ran, one_line
 # Programs that tests start inherit it.
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
-ENCODE = ("cv2", "imagecodecs", "OpenImageIO", "onnx", "PIL", "torch", "tqdm")
+ENCODE = ("cv2", "imagecodecs", "OpenImageIO", "onnx", "onnxruntime", "PIL", "torch", "tqdm")
 """What the extra ``encode`` installs."""
 
 KINDS = {
@@ -31,6 +31,7 @@ KINDS = {
     "bench": ("encoder", (*ENCODE, "matplotlib")),
     "cli/test_colour_cli.py": ("encoder", ENCODE),
     "cli/test_encode_cli.py": ("encoder", ENCODE),
+    "cli/test_models_cli.py": ("encoder", ENCODE),
     "test_docs.py": ("encoder", ENCODE),
     "web": ("browser", ()),
 }

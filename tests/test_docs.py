@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from proxyimg_codec.io import raster
+from tests.support import onnx_models
 from tests.support.paths import ROOT
 from tests.support.pictures import disc, smooth
 
@@ -58,6 +59,8 @@ def folder(tmp_path_factory):
     raster.write(path / "parrots.png", smooth(96, 64))
     raster.write(path / "parrots-labels.png", np.repeat(labels[..., None], 3, 2))
     (path / "breathe.json").write_text(blocks("docs/guide/animation.md", "json")[0])
+    onnx_models.write(path / "u2netp.onnx", onnx_models.figures())
+    onnx_models.write(path / "depth.onnx", onnx_models.depth())
     edits = [{"op": "move", "layer": "cat", "by": [3, 4]}]
     (path / "edits.json").write_text(json.dumps({"version": 1, "edits": edits}))
     return path

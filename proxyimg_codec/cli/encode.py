@@ -82,8 +82,10 @@ def _add_decomposition(p: argparse.ArgumentParser) -> None:
     )
     add("--max-layers", type=int, metavar="N", help="most layers found; default 4")
     add("--layers", type=int, choices=[1], help="1: one layer, no decomposition")
-    add("--segmenter", metavar="NAME", help="who finds layers; default regions, "
-        "others are added by plug-in packages")  # fmt: skip
+    add("--segmenter", metavar="NAME", help="who finds layers; default regions, others are added "
+        "by plug-in packages; or a model: an ONNX file, or a name of pxi-models")  # fmt: skip
+    add("--depth", metavar="NAME", help="model of depth that puts found layers in order: an ONNX "
+        "file, or a name of pxi-models")  # fmt: skip
     add("--boundary", choices=["lsq", "chamfer"], help="boundary fit: least squares "
         "(default), or the slower adaptive Chamfer fit of the paper")  # fmt: skip
     add("--background", choices=["diffuse", "complete"], default="diffuse",
@@ -267,7 +269,7 @@ def refuse_for_layers(args: argparse.Namespace) -> None:
     """
     from ..errors import UsageError
 
-    for name in ("masks", "layers", "max_layers", "segmenter", "frame", "tone"):
+    for name in ("masks", "layers", "max_layers", "segmenter", "depth", "frame", "tone"):
         if getattr(args, name) is not None:
             flag = name.replace("_", "-")
             raise UsageError(f"--{flag}: the input has layers of its own, which are kept")
@@ -289,8 +291,8 @@ def settings_from(args: argparse.Namespace) -> Any:
         if aims:
             raise UsageError(f"--quality and --{aims[0].replace('_', '-')} contradict each other")
     rivals = [n for n in ("layers", "masks", "max_layers") if getattr(args, n) is not None]
-    if args.segmenter is not None and (args.layers or args.masks):
-        rivals.append("segmenter")
+    if args.layers or args.masks:
+        rivals += [n for n in ("segmenter", "depth") if getattr(args, n) is not None]
     if len(rivals) > 1:
         names = " and ".join(f"--{n.replace('_', '-')}" for n in rivals)
         raise UsageError(f"{names} contradict each other")

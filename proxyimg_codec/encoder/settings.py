@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
+import os
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
@@ -60,7 +61,10 @@ class Settings:
         target_size: Size of the file in bytes, instead of `quality`; pyramid only.
         target_psnr: PSNR of the decoded picture in dB, instead of `quality`; pyramid only.
         max_layers: Most layers that the segmenter may find, 1..64; 1 does without it.
-        segmenter: Name of the segmenter; see `plugins`.
+        segmenter: Name of the segmenter, see `plugins`; or a model: its path, or its name as
+            `pxi-models` lists it.
+        depth: Model that says which of the layers that are found are in front, as `segmenter`,
+            or a plug-in of the kind `depth`; None leaves the order to the segmenter.
         feature_bits: Bits per code, 2..8; None = decided by `quality`; implicit only.
         net_bits: Bits per weight, 2..8; None = 8; implicit only.
         sampling: ``direct``, or ``node`` for the paper's method: features from mesh and boundary,
@@ -87,6 +91,7 @@ class Settings:
     target_psnr: float | None = None
     max_layers: int = 4
     segmenter: str = "regions"
+    depth: str | None = None
     feature_bits: int | None = None
     net_bits: int | None = None
     sampling: str = "direct"
@@ -236,11 +241,17 @@ class Settings:
     def record(self) -> dict[str, Any]:
         """Settings that differ from the defaults, by name, to be recorded in the file.
 
-        `jobs` and `device` are left out, so that the file does not depend on the machine.
+        `jobs` and `device` are left out, so that the file does not depend on the machine, and so
+        are the folders of models.
         """
         usual = {f.name: f.default for f in fields(self)}
-        return {
+        changed = {
             k: v
             for k, v in asdict(self).items()
             if k not in ("jobs", "device") and v != usual.get(k)
         }
+        for name in ("segmenter", "depth"):
+            if name in changed:
+                files = changed[name].split(os.pathsep)
+                changed[name] = os.pathsep.join(os.path.basename(file) for file in files)
+        return changed

@@ -7,6 +7,8 @@ A package offers a plug-in as an entry point in the group ``proxyimg_codec.KIND`
 
 Kinds:
     segmenters: `(rgb, max_layers, support) -> list[Region]`, as `encoder.shapes.segment.segment`.
+    prompters: `(rgb, prompts) -> list[Region]`, a region for each `encoder.shapes.prompts.Prompt`.
+    depth: `(rgb) -> float32 [H, W]`, larger is nearer; any scale.
     meshers: `(boundary, size, edge) -> Base`, as `geometry.mesher.delaunay`.
     engines: `(texture, network, taps) -> float32 [N, channels]`, as `render.engines.run_numpy`.
     handles: `(picture) -> Image`: what functions below `api` give to those who call them directly.
@@ -22,8 +24,10 @@ from ..errors import UnsupportedError, UsageError
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint, EntryPoints
 
-BUILT_IN = {
+BUILT_IN: dict[str, dict[str, str]] = {
     "segmenters": {"regions": "proxyimg_codec.encoder.shapes.segment:segment"},
+    "prompters": {"sam": "proxyimg_codec.encoder.shapes.external_models.prompting:prompted"},
+    "depth": {},
     "meshers": {
         "delaunay": "proxyimg_codec.geometry.mesher:delaunay",
         "triwild": "proxyimg_codec.encoder.shapes.external_meshers:triwild",
@@ -68,7 +72,8 @@ def find(kind: str, name: str) -> Any:
     for entry in _added(kind):
         if entry.name == name:
             return _loaded(kind, entry)
-    raise UsageError(f"{kind}: {name!r} is unknown; there are {', '.join(names(kind))}")
+    there = ", ".join(names(kind)) or "none"
+    raise UsageError(f"{kind}: {name!r} is unknown; there are {there}")
 
 
 def _loaded(kind: str, entry: EntryPoint) -> Any:

@@ -305,10 +305,10 @@ def test_a_missing_file_of_an_odd_name_is_one_line(tool, here, name):
 
 
 @pytest.mark.parametrize(
-    "name", ["encode", "decode", "edit", "animate", "info", "validate", "bench"]
+    "name", ["encode", "decode", "edit", "animate", "info", "validate", "bench", "models"]
 )
 def test_refused_words_control_no_terminal(tool, here, name):
-    words = ["rd"] if name == "bench" else []
+    words = {"bench": ["rd"], "models": ["list"]}.get(name, [])
     err = tool(name, *words, "a", "b", "--\x1b[2J\udcff\n", code=2).err
     assert "\\x1b[2J" in err
     assert all(line.isprintable() for line in err.splitlines())

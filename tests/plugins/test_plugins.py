@@ -33,6 +33,15 @@ def offer(monkeypatch, entry):
 
 
 @pytest.mark.encoder
+def test_prompters_and_depth_are_kinds():
+    assert "sam" in plugins.names("prompters")
+    assert plugins.names("depth") == []
+    assert plugins.find("prompters", "sam").__name__ == "prompted"
+    with pytest.raises(pxi.UsageError, match="depth: 'x' is unknown"):
+        plugins.find("depth", "x")
+
+
+@pytest.mark.encoder
 def test_added_segmenters_are_used(added):
     assert plugins.names("segmenters") == ["regions", "halves"]
     image = pxi.encode(smooth(40, 30), segmenter="halves", effort=1, jobs=1)

@@ -68,12 +68,15 @@ class Hierarchy:
         return np.asarray(self.of_basins(level)[self.basins])
 
 
-def hierarchy(boundary: Floats, inside: NDArray[np.bool_] | None = None, look: Floats | None = None) -> Hierarchy:
+def hierarchy(
+    boundary: Floats, inside: NDArray[np.bool_] | None = None, look: Floats | None = None
+) -> Hierarchy:
     """Divides a picture.
 
     Args:
         boundary: float32 [h, w] in 0..1, strength of boundaries.
         inside: bool [h, w], False for pixels whose boundaries count as strongest; None for none.
+        look: float32 [h, w, C]; differences of means of regions add to their boundary. None: none.
     """
     if inside is not None:
         boundary = np.where(inside, boundary, np.float32(1))
@@ -130,13 +133,16 @@ def borders(labels: Labels, boundary: Floats) -> tuple[Labels, Labels, Floats]:
     return np.stack(np.divmod(pairs, count), 1), lengths, sums
 
 
-def merged(basins: Labels, boundary: Floats, kinds: Labels | None = None, look: Floats | None = None) -> Hierarchy:
+def merged(
+    basins: Labels, boundary: Floats, kinds: Labels | None = None, look: Floats | None = None
+) -> Hierarchy:
     """Merges regions across the weakest boundary until none is left.
 
     Args:
         basins: int [h, w], numbers of the regions from 0.
         boundary: float32 [h, w], strength of boundaries.
         kinds: int [N], kind of each region; those of different kinds never merge. None for one.
+        look: float32 [h, w, C], as for `hierarchy`.
     """
     pairs, lengths, sums = borders(basins, boundary)
     if kinds is not None:

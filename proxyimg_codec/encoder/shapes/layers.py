@@ -9,13 +9,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ... import plugins
 from ...errors import InputError
 from ...geometry.boundary import Boundary
 from ...geometry.mesh import Mesh
 from ...texture.network import Floats
 from ..settings import LAYERS_MAX, Settings
 from .contours import fit_paths
+from .external_models.depth import ordered_by_depth
+from .external_models.segmenters import find_depth, find_segmenter
 from .masks import Region, resolve
 
 UNIT = 2
@@ -81,7 +82,7 @@ def plan_layers(picture: Floats, settings: Settings, masks: Sequence[Region] | N
 
     Raises:
         InputError: A mask is invalid or does not fit the picture, or there are too many.
-        UsageError: There is no such segmenter.
+        UsageError: There is no such segmenter or model of depth.
     """
     height, width = picture.shape[:2]
     alpha = picture[..., 3]
@@ -104,8 +105,11 @@ def plan_layers(picture: Floats, settings: Settings, masks: Sequence[Region] | N
         regions = [Region("picture", whole)]
     else:
         rgb = np.rint(picture[..., :3] * 255).astype(np.uint8)
-        segment = plugins.find("segmenters", settings.segmenter)
+        segment = find_segmenter(settings.segmenter, settings.jobs)
         regions = segment(rgb, settings.max_layers, support)
+        if settings.depth is not None and len(regions) > 1:
+            depth = find_depth(settings.depth, settings.jobs)(rgb)
+            regions = ordered_by_depth(regions, depth, opaque)
     outline = alpha if not opaque and not soft and height * width <= FINE_PIXELS else None
     # The planes hold one alpha per sample, which overlapping layers would apply twice.
     overlap = 0 if soft and settings.pyramid else OVERLAP

@@ -1,20 +1,18 @@
 """Maps of a picture by the layers network: what stands out, where its edges are, who is in front.
 
-The network (`models/layers-1.onnx.zst`; `training/layers.py` makes it) sees the picture at two sizes.
-What stands out is judged as a whole, in a small copy; edges are found in a larger one.
+The network (`models/layers-1.onnx.zst`; `training/layers.py` makes it) sees the picture at two
+sizes. What stands out is judged as a whole, in a small copy; edges are found in a larger one.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
-from importlib import resources
-from typing import Any
 
 import cv2
 import numpy as np
-import zstandard
 from numpy.typing import NDArray
+
+from .onnx_model import shipped
 
 Floats = NDArray[np.float32]
 
@@ -64,18 +62,5 @@ def _run(rgb: NDArray[np.uint8], side: int, jobs: int) -> Floats:
     pad = (-high % MULTIPLE, -wide % MULTIPLE)
     copy = cv2.copyMakeBorder(copy, 0, pad[0], 0, pad[1], cv2.BORDER_REPLICATE)
     planes = copy.astype(np.float32).transpose(2, 0, 1)[None] / 255
-    found = _session(jobs).run(None, {"rgb": planes})[0][0, :, :high, :wide]
+    found = shipped(MODEL, jobs).run({"rgb": planes})[0][0, :, :high, :wide]
     return np.stack([cv2.resize(plane, (width, height)) for plane in found])
-
-
-@cache
-def _session(jobs: int) -> Any:
-    import onnxruntime
-
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = jobs
-    options.inter_op_num_threads = 1
-    options.log_severity_level = 3
-    packed = (resources.files("proxyimg_codec.models") / MODEL).read_bytes()
-    model = zstandard.decompress(packed)
-    return onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
