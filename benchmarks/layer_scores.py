@@ -13,8 +13,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from proxyimg_codec.encoder.shapes.masks import Region
-
 Mask = NDArray[np.bool_]
 Labels = NDArray[Any]
 Real = NDArray[np.float64]
@@ -29,16 +27,6 @@ SAME, PAIRED = 0.9, 0.5
 
 CLICKS = 3
 """Clicks that a thing gets."""
-
-
-def visible(regions: Sequence[Region]) -> list[Mask]:
-    """Visible parts of regions that are given back to front, bool [H, W] each, disjoint."""
-    masks = list[Mask]()
-    covered = np.zeros(regions[0].mask.shape, np.bool_)
-    for region in reversed(regions):
-        masks.insert(0, region.mask & ~covered)
-        covered |= region.mask
-    return masks
 
 
 def iou(one: Mask, other: Mask) -> float:

@@ -35,7 +35,7 @@ from proxyimg_codec import plugins
 from proxyimg_codec.bench.measure import psnr
 from proxyimg_codec.encoder.settings import Settings
 from proxyimg_codec.encoder.shapes.labels import label_regions
-from proxyimg_codec.encoder.shapes.masks import Region
+from proxyimg_codec.encoder.shapes.masks import Region, visible
 from proxyimg_codec.io import raster
 
 Segmenter = Callable[..., list[Region]]
@@ -92,7 +92,7 @@ def coco(data: Path, name: str, count: int | None) -> Iterator[str]:
         if not wanted:
             continue
         regions, spent = timed(segment, read_rgb(file), LAYERS)
-        found = scores.best(scores.visible(regions), wanted)
+        found = scores.best(visible(regions), wanted)
         mean.append(float(np.mean(found)))
         first.append(float(found[0] >= 0.7))
         seconds.append(spent)
@@ -141,7 +141,7 @@ def composed(data: Path, name: str, count: int | None) -> Iterator[str]:
     found, ordered, pairs, images = list[float](), list[bool](), 0, 0
     for image in composites(data, 60 if count is None else count):
         regions = segment(image.rgb, LAYERS, None)
-        score = scores.sprites(scores.visible(regions), image.masks, image.pairs)
+        score = scores.sprites(visible(regions), image.masks, image.pairs)
         found += score.best
         ordered += score.ordered
         pairs += score.pairs
@@ -284,7 +284,7 @@ def sheet(rgb: Pixels, regions: list[Region]) -> Pixels:
     y, x = np.mgrid[: rgb.shape[0], : rgb.shape[1]] // 16
     board = np.where((x + y)[..., None] % 2, np.uint8(160), np.uint8(208))
     outlined, tiles = rgb.copy(), []
-    for region, colour, seen in zip(regions, colours, scores.visible(regions), strict=True):
+    for region, colour, seen in zip(regions, colours, visible(regions), strict=True):
         found = cv2.findContours(seen.astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)[0]
         cv2.drawContours(outlined, found, -1, colour, max(2, max(rgb.shape) // 300))
         tiles.append(np.where(region.mask[..., None], rgb, board).astype(np.uint8))

@@ -6,7 +6,6 @@ import pytest
 
 from benchmarks import composites as c
 from benchmarks import layer_scores as s
-from proxyimg_codec.encoder.shapes.masks import Region
 
 HEIGHT, WIDTH = 61, 83
 
@@ -18,14 +17,6 @@ def box(left, top, width, height):
 
 
 ALL = box(0, 0, WIDTH, HEIGHT)
-
-
-def test_visible_parts_are_what_is_not_covered():
-    back, cat, eye = s.visible([Region("a", ALL), Region("b", box(5, 5, 20, 20)),
-                                Region("c", box(10, 10, 4, 4))])  # fmt: skip
-    assert back.sum() == ALL.sum() - 400
-    assert cat.sum() == 400 - 16
-    assert eye.sum() == 16
 
 
 def test_things_are_the_largest_labels_that_are_no_stuff():
