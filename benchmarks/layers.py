@@ -34,8 +34,11 @@ from benchmarks.composites import composites
 from proxyimg_codec import plugins
 from proxyimg_codec.bench.measure import psnr
 from proxyimg_codec.encoder.settings import Settings
+from proxyimg_codec.encoder.shapes.hierarchy import partitions
 from proxyimg_codec.encoder.shapes.labels import label_regions
+from proxyimg_codec.encoder.shapes.maps import Maps, find_maps
 from proxyimg_codec.encoder.shapes.masks import Region, visible
+from proxyimg_codec.encoder.shapes.order import back_to_front
 from proxyimg_codec.io import raster
 
 Segmenter = Callable[..., list[Region]]
@@ -43,7 +46,7 @@ Segmenter = Callable[..., list[Region]]
 LAYERS = 4
 """Most layers, as at defaults."""
 
-LEVELS = tuple(np.linspace(0.02, 0.98, 49).tolist())
+LEVELS = np.linspace(0.02, 0.98, 49).tolist()
 """Strengths of boundaries at which hierarchies are cut, fine to coarse."""
 
 OWN = 64
@@ -106,16 +109,15 @@ def coco(data: Path, name: str, count: int | None) -> Iterator[str]:
 def bsds(data: Path, name: str, count: int | None) -> Iterator[str]:
     """Yields how well regions cover people's segmentations."""
     segment = plugins.find("segmenters", name)
-    figures, maps = import_module(f"{SHAPES}.figures"), import_module(f"{SHAPES}.maps")
     levels, own, regions_found, seconds = list[list[float]](), list[float](), list[int](), 0.0
     files = every([*(data / "layers" / "bsds").glob("*.jpg")], 5, 0, count)
     for file in files:
         rgb = read_rgb(file)
         people = [read_labels(p) for p in sorted(file.parent.glob(f"{file.stem}-*.png"))]
         start = time.process_time()
-        hierarchy = figures.hierarchy(maps.find_maps(rgb), LEVELS)
+        divided = partitions(find_maps(rgb), LEVELS)
         seconds += time.process_time() - start
-        levels.append([scores.covering(labels, people) for labels in hierarchy])
+        levels.append([scores.covering(labels, people) for labels in divided])
         regions = segment(rgb, OWN, None)
         labels = np.zeros(rgb.shape[:2], np.intp)
         for k, region in enumerate(regions):
@@ -235,19 +237,19 @@ def cost(data: Path, name: str, count: int | None) -> Iterator[str]:
 
 def order(data: Path, name: str, count: int | None) -> Iterator[str]:
     """Yields whether layers stand in the order of a measured depth."""
-    stacked = import_module(f"{SHAPES}.order").by_depth
     with np.load(data / "depth" / "motorcycle_disp.npz") as file:
         disparity = np.asarray(file["arr_0"], np.float32)
     known = np.isfinite(disparity)
+    blank = np.zeros_like(disparity)
+    no_maps = Maps(blank, blank, np.dstack([blank, blank]))
     right = pairs = 0
     rng = np.random.default_rng(0)
     for layers in range(2, 2 + (7 if count is None else count)):
         ends = np.quantile(disparity[known], np.linspace(0, 1, layers + 1))
         slices = np.clip(np.searchsorted(ends, disparity) - 1, 0, layers - 1)
-        regions = [Region(str(k), known & (slices == k)) for k in range(layers)]
-        shuffled = [regions[k] for k in rng.permutation(layers)]
-        depth = np.where(known, disparity, 0).astype(np.float32)
-        one, all_of_them = scores.inversions([int(r.name) for r in stacked(shuffled, depth)])
+        masks = [known & (slices == k) for k in rng.permutation(layers)]
+        found = [int(slices[mask][0]) for mask in back_to_front(masks, no_maps, disparity)]
+        one, all_of_them = scores.inversions(found)
         right, pairs = right + one, pairs + all_of_them
     yield f"order, motorcycle, slices of its disparity: {right} of {pairs} pairs in order"
 
