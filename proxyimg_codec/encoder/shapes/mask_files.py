@@ -114,14 +114,14 @@ def _mask_files(folder: Path, above: str = "") -> list[tuple[str, Path]]:
     except OSError as error:
         raise InputError(f"{folder}: cannot be read: {error.strerror}") from None
     files = [f for f in seen if f.suffix.lower() in TYPES and not f.is_dir()]
-    found = [(_stack_order(f), 0, [(above + _name(f), f)]) for f in files]
-    wholes = {_name(f): f for f in reversed(files)}
+    found = [(_stack_order(f), 0, [(above + region_name(f), f)]) for f in files]
+    wholes = {region_name(f): f for f in reversed(files)}
     for other in (f for f in seen if f not in files):
         parts = []
         if other.is_dir() and not other.is_symlink():
-            parts = _mask_files(other, f"{above}{_name(other)}/")
+            parts = _mask_files(other, f"{above}{region_name(other)}/")
         if parts:
-            found.append((_stack_order(wholes.get(_name(other), other)), 1, parts))
+            found.append((_stack_order(wholes.get(region_name(other), other)), 1, parts))
         elif other.is_dir() or is_picture(other):
             kind = "a folder without masks" if other.is_dir() else "no type of masks"
             logging.getLogger(__name__).warning("%s: %s; it is left out", other, kind)
@@ -139,7 +139,7 @@ def _stack_order(file: Path) -> tuple[bool, list[tuple[int, str]], str]:
     return stem not in BACK_NAMES, natural, file.name
 
 
-def _name(file: Path) -> str:
+def region_name(file: Path) -> str:
     """Name of a mask or folder: its stem without the number in front, not too long."""
     stem = "".join(c if c.isprintable() else "?" for c in _stem(file))
     return re.sub(r"^\d+[ ._-]+(?=.)", "", stem)[:NAME_MAX]

@@ -67,11 +67,12 @@ def resolve(
     if support is not None:
         check_size("the support of the picture", support, width, height)
     whole = np.ones((height, width), np.bool_) if support is None else support
-    stack = [Region(r.name, r.mask & whole) for r in sorted(regions, key=lambda r: not _is_back(r))]
+    ordered = sorted(regions, key=lambda r: not is_back(r.name))
+    stack = [Region(r.name, r.mask & whole) for r in ordered]
     free = whole.copy()
     for region in stack:
         free &= ~region.mask
-    if support is None and stack and _is_back(stack[0]):
+    if support is None and stack and is_back(stack[0].name):
         stack[0] = replace(stack[0], mask=stack[0].mask | free)
     elif free.any():
         stack.insert(0, Region("back" if support is None else "rest", free))
@@ -171,8 +172,9 @@ def _colour_word(rgb: NDArray[np.float32]) -> str:
     return "brown" if word == "orange" and light < 50 else word
 
 
-def _is_back(region: Region) -> bool:
-    return region.name.lower() in BACK_NAMES
+def is_back(name: str) -> bool:
+    """Whether a region of this name belongs to the back."""
+    return name.lower() in BACK_NAMES
 
 
 def check_count(count: int, what: str) -> None:
