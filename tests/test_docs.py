@@ -45,11 +45,13 @@ def commands(page):
 def folder(tmp_path_factory):
     path = tmp_path_factory.mktemp("docs")
     raster.write(path / "photo.png", smooth(96, 64))
-    (path / "masks").mkdir()
+    (path / "masks" / "cat").mkdir(parents=True)
     mask = disc(96, 64)
     low = np.zeros_like(mask)
     low[50:] = True
-    for name, m in (("1 bush", low), ("2 cat", mask)):
+    eye = np.zeros_like(mask)
+    eye[26:32, 44:50] = True
+    for name, m in (("1 bush", low), ("2 cat", mask), ("cat/eye", eye)):
         raster.write(path / "masks" / f"{name}.png", np.repeat(m[..., None] * np.uint8(255), 3, 2))
     labels = np.where(mask, 2, low.astype(int)).astype(np.uint8)
     raster.write(path / "labels.png", np.repeat(labels[..., None], 3, 2))

@@ -77,8 +77,8 @@ def _add_decomposition(p: argparse.ArgumentParser) -> None:
     add(
         "--masks",
         metavar="PATH",
-        help="the layers to make: a folder of masks, or one picture "
-        "of labels (palette or grey: 0 is the back, 1, 2, ... are objects)",
+        help="the layers to make: a folder of masks (cat/eye.png: a part that follows cat.png), or "
+        "one picture of labels (palette or grey: 0 is the back, 1, 2, ... are objects)",
     )
     add("--max-layers", type=int, metavar="N", help="most layers found; default 4")
     add("--layers", type=int, choices=[1], help="1: one layer, no decomposition")
@@ -196,10 +196,7 @@ def mask_files(path: str | None) -> list[str]:
     """Files that --masks names, as far as they can be listed."""
     if path is None:
         return []
-    try:
-        return [os.path.join(path, name) for name in os.listdir(path)]
-    except OSError:
-        return [path]
+    return [os.path.join(at, name) for at, _, names in os.walk(path) for name in names] or [path]
 
 
 def encoded(source: bytes, args: argparse.Namespace, settings: Any, bar: Bar) -> tuple[Any, Any]:

@@ -184,10 +184,12 @@ def fit_image(
         "areas": list(problem.areas),
     }
     layers = [
-        Layer(layer.name, plane.box, layer.boundary, texture, layer.mesh, problem.sampling)
+        Layer(layer.name, plane.box, layer.boundary, texture, layer.mesh, problem.sampling,
+              parent=layer.parent)
         for layer, plane, texture in zip(plan.layers, problem.planes, textures, strict=True)
-    ]
-    return Picture(*size, plan.channels, plan.opaque, 8, Layers(layers), (network,), info=info)
+    ]  # fmt: skip
+    return Picture(*size, plan.channels, plan.opaque, 8, Layers(layers), (network,), info=info,
+                   groups=plan.groups)  # fmt: skip
 
 
 def check_blocks(blocks: Mapping[str, bytes]) -> None:

@@ -66,9 +66,11 @@ def encode_picture(picture: Floats, plan: Plan, settings: Settings, report: Repo
         UsageError: A target size or PSNR is out of reach.
     """
     height, width = picture.shape[:2]
-    shown = visible([coverage_of(v.boundary, width, height).reshape(height, width)
-                     for v in plan.layers])  # fmt: skip
-    views = [_view([v.boundary for v in plan.layers], k, seen) for k, seen in enumerate(shown)]
+    boundaries = [v.boundary for v in plan.layers]
+    views = [
+        _view(boundaries, k, coverage_of(boundary, width, height).reshape(height, width))
+        for k, boundary in enumerate(boundaries)
+    ]
     rasters = [colour_of(picture)._replace(structural=settings.tune == "ms-ssim")]
     if plan.channels == 4:
         rasters.append(alpha_of(picture[..., 3]))
@@ -77,10 +79,11 @@ def encode_picture(picture: Floats, plan: Plan, settings: Settings, report: Repo
         layers = [
             Layer(v.name, box, v.boundary,
                   PyramidTexture(sources[0], sources[1] if len(sources) > 1 else None, box,
-                                 cuts=cuts), v.mesh)
+                                 cuts=cuts), v.mesh, parent=v.parent)
             for v, (box, cuts) in zip(plan.layers, views, strict=True)
         ]  # fmt: skip
-        return Picture(width, height, plan.channels, plan.opaque, 8, Layers(layers), ())
+        return Picture(width, height, plan.channels, plan.opaque, 8, Layers(layers), (),
+                       groups=plan.groups)  # fmt: skip
 
     return encode_rasters(rasters, picture_of, picture, settings, report)
 
@@ -183,40 +186,23 @@ def _aimed(
     return image
 
 
-def visible(shares: Sequence[Floats]) -> list[Floats]:
-    """Share of each sample that each layer shows.
-
-    Args:
-        shares: float32 [H, W] coverage by each layer, back to front.
-
-    Returns:
-        For each layer float32 [H, W] in 0..1.
-    """
-    clear = np.ones_like(shares[0])
-    out: list[Floats] = []
-    for covered in reversed(shares):
-        out.append(clear * covered)
-        clear = clear * (1 - covered)
-    return out[::-1]
-
-
 def _view(
-    boundaries: Sequence[Boundary | None], number: int, seen: Floats
+    boundaries: Sequence[Boundary | None], number: int, covered: Floats
 ) -> tuple[Box, Occlusion | None]:
     """Box and cuts of a layer.
 
     Args:
         boundaries: Boundaries of all layers at rest, back to front.
         number: Number of the layer.
-        seen: float32 [H, W] share of each sample that it shows.
+        covered: float32 [H, W] share of each sample that it covers, whether that shows or not.
 
     Returns:
-        The rectangle x, y, width, height that holds what it shows, and the boundaries that cut it;
-        None if there is only one layer.
+        The rectangle x, y, width, height that holds the layer, and the boundaries that cut it; None
+        if there is only one layer.
     """
-    height, width = seen.shape
-    rows, columns = np.flatnonzero(seen.any(1)), np.flatnonzero(seen.any(0))
-    if boundaries[number] is None or not len(rows):  # the whole canvas, or wholly hidden
+    height, width = covered.shape
+    rows, columns = np.flatnonzero(covered.any(1)), np.flatnonzero(covered.any(0))
+    if boundaries[number] is None or not len(rows):  # the whole canvas, or too small to be seen
         box = (0, 0, width, height)
     else:
         # A margin for the interpolating kernel, whose samples beyond the rim are then filled.

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
@@ -13,17 +13,21 @@ from ...errors import InputError
 from ...geometry.boundary import Boundary
 from ...geometry.mesh import Mesh
 from ...texture.network import Floats
-from ..settings import LAYERS_MAX, Settings
+from ..settings import Settings
 from .contours import fit_paths
 from .external_models.depth import ordered_by_depth
 from .external_models.segmenters import find_depth, find_segmenter
-from .masks import Region, resolve
+from .masks import NAME_MAX, Region, check_count, groups_of, resolve
 
 UNIT = 2
 """Unit of boundaries: control points are multiples of 2**-UNIT pixel."""
 
 OVERLAP = 3
 """Pixels by which a layer continues under those in front of it, so that nothing shines through."""
+
+CORNER = 24
+"""Most pixels of a continuation that is only the corner where two outlines cross; an edge of 8
+pixels has as many."""
 
 SOFT_PIXELS = 16
 """Least size, in pixels, of a connected translucent part away from outlines, from which on textures
@@ -47,11 +51,13 @@ class LayerPlan:
         name: Name of the layer.
         boundary: Boundary at rest; None for the whole canvas.
         mesh: Mesh of the layer, or None.
+        parent: Name of the layer or group that the layer follows, or None.
     """
 
     name: str
     boundary: Boundary | None
     mesh: Mesh | None = None
+    parent: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,11 +68,13 @@ class Plan:
         layers: Layers, back to front.
         channels: Channels of their textures: 3 for colour, 4 for colour and alpha.
         opaque: Whether the back layer covers the whole canvas.
+        groups: Parent of each group, or None, by the group's name.
     """
 
     layers: tuple[LayerPlan, ...]
     channels: int
     opaque: bool
+    groups: Mapping[str, str | None] = field(default_factory=dict)
 
 
 def plan_layers(picture: Floats, settings: Settings, masks: Sequence[Region] | None) -> Plan:
@@ -111,19 +119,49 @@ def plan_layers(picture: Floats, settings: Settings, masks: Sequence[Region] | N
             depth = find_depth(settings.depth, settings.jobs)(rgb)
             regions = ordered_by_depth(regions, depth, opaque)
     outline = alpha if not opaque and not soft and height * width <= FINE_PIXELS else None
+    check_count(len(regions), "layers, with what no mask covers,")
     # The planes hold one alpha per sample, which overlapping layers would apply twice.
     overlap = 0 if soft and settings.pyramid else OVERLAP
-    layers = []
-    for k, region in enumerate(regions):
-        if opaque and k == 0:
-            layers.append(LayerPlan(region.name, None))
-            continue
-        front = np.zeros((height, width), bool)
-        for other in regions[k + 1 :]:
-            front |= other.mask
-        mask = region.mask | (_dilate(region.mask, overlap) & front)
-        layers.append(LayerPlan(region.name, _boundary(mask, outline, settings)))
-    return Plan(tuple(layers), 4 if soft else 3, opaque)
+    solid = None if opaque and settings.pyramid else alpha >= 0.97
+    layers: list[LayerPlan] = []
+    front = np.zeros((height, width), bool)
+    for k, region in reversed(list(enumerate(regions))):
+        boundary = None
+        if not opaque or k > 0:
+            mask = _continued(region.mask, front, overlap, solid)
+            boundary = _boundary(mask, outline, settings)
+        layers.insert(0, LayerPlan(region.name, boundary, parent=region.parent))
+        front |= region.mask
+    return Plan(tuple(layers), 4 if soft else 3, opaque, groups_of(regions))
+
+
+def _continued(
+    mask: NDArray[np.bool_],
+    front: NDArray[np.bool_],
+    overlap: int,
+    solid: NDArray[np.bool_] | None,
+) -> NDArray[np.bool_]:
+    """Mask of a layer as its boundary has it: with what may be, and what must be, hidden of it.
+
+    Args:
+        mask: bool [H, W], the mask of the layer.
+        front: bool [H, W], the masks of all in front of it.
+        overlap: Pixels by which it continues at least under those that it touches.
+        solid: bool [H, W], pixels that let nothing through. Hidden parts keep away from others, and
+            from outlines of layers in front with nothing of this layer beyond, where the coverage
+            of both would add up. None for planes of an opaque picture, where neither matters.
+    """
+    seen, hidden = mask & ~front, mask & front
+    more = _dilate(seen, overlap) & front
+    if hidden.any():
+        # The layer goes on by itself where its outline crosses another.
+        beyond = more & ~hidden
+        _, labels, stats, _ = cv2.connectedComponentsWithStats(beyond.astype(np.uint8))
+        corners = np.unique(labels[beyond & _dilate(hidden, 1)])
+        more &= ~np.isin(labels, corners[stats[corners, cv2.CC_STAT_AREA] <= CORNER])
+    if solid is not None:
+        hidden &= _eroded(solid & (mask | front), OVERLAP)
+    return np.asarray(seen | hidden | more)
 
 
 def _boundary(mask: NDArray[np.bool_], outline: Floats | None, settings: Settings) -> Boundary:
@@ -159,13 +197,17 @@ def _dilate(mask: NDArray[np.bool_], radius: int) -> NDArray[np.bool_]:
     return cv2.dilate(mask.astype(np.uint8), kernel) > 0
 
 
+def _eroded(mask: NDArray[np.bool_], radius: int) -> NDArray[np.bool_]:
+    """Mask without what is nearer to the outside than a radius; the frame is no outside."""
+    return ~_dilate(~mask, radius)
+
+
 def _check_masks(masks: Sequence[Region]) -> None:
-    if len(masks) > LAYERS_MAX:
-        raise InputError(f"{len(masks)} masks are too many; at most {LAYERS_MAX} are possible")
+    check_count(len(masks), "masks")
     for region in masks:
         name: object = region.name
-        if not (isinstance(name, str) and 1 <= len(name) <= 200 and name.isprintable()):
-            raise InputError(f"mask name {name!r} must be 1..200 printable characters")
+        if not (isinstance(name, str) and 1 <= len(name) <= NAME_MAX and name.isprintable()):
+            raise InputError(f"mask name {name!r} must be 1..{NAME_MAX} printable characters")
 
 
 def _translucent(alpha: Floats) -> NDArray[np.bool_]:

@@ -27,9 +27,9 @@ def regions_of(masks: Masks, height: int, width: int) -> list[Region]:
     """Makes regions of masks, back to front.
 
     A list of arrays, or an array [N, H, W], has a mask a layer: `object 1`, `object 2` and so on; a
-    dict names them. One array [H, W] of whole numbers, or of bool, has labels: 0 for the back
-    layer, then 1, 2, ... for objects. An array of floats [H, W] is one mask. What is inside a mask:
-    see `inside`.
+    dict names them, and ``cat/eye`` is a part that follows ``cat``. One array [H, W] of whole
+    numbers, or of bool, has labels: 0 for the back layer, then 1, 2, ... for objects. An array of
+    floats [H, W] is one mask. What is inside a mask: see `inside`.
 
     Args:
         masks: The masks, or regions, whose masks may be of any kind that arrays may be.

@@ -16,7 +16,7 @@ from ...errors import InputError
 from ...io.names import is_picture
 from .labels import label_regions
 from .mask_arrays import inside, warn_of_soft
-from .masks import BACK_NAMES, Region, check_size
+from .masks import BACK_NAMES, NAME_MAX, Region, check_count, check_size
 
 TYPES = (
     ".bmp", ".gif", ".jfif", ".jp2", ".jpeg", ".jpg", ".npy", ".pbm", ".pgm", ".png", ".pnm",
@@ -53,10 +53,12 @@ def load_masks(path: str | Path, width: int, height: int) -> list[Region]:
     A folder holds the mask of one layer in each picture file; files whose names begin with a dot,
     and what is no picture, are passed over. The natural order of the file names is back to front,
     with `back` or `background` first. A region has the name of its file without a number in front:
-    `2 cat.png` is `cat`. Inside is where alpha is at least one half if the file has transparency;
-    otherwise what is not index 0 of a palette with colours; otherwise what is at least half as
-    light as white, or not 0 in files with only 0 and another value. Masks with more values are cut
-    at one half, which is logged as a warning.
+    `2 cat.png` is `cat`. A folder within holds parts, in front of the mask that has its name:
+    `cat/eye.png` is `cat/eye`, which follows `cat`; without `cat.png`, `cat` is a group. Links to
+    folders are not followed. Inside is where alpha is at least one half if the file has
+    transparency; otherwise what is not index 0 of a palette with colours; otherwise what is at
+    least half as light as white, or not 0 in files with only 0 and another value. Masks with more
+    values are cut at one half, which is logged as a warning.
 
     A single file holds labels: 0 for the back layer, then 1, 2, ... for objects back to front. The
     index of a palette is the label, whatever its colours; otherwise a grey value is its label, of 8
@@ -72,54 +74,75 @@ def load_masks(path: str | Path, width: int, height: int) -> list[Region]:
         Regions back to front. They may overlap and need not cover the picture: `masks.resolve`.
 
     Raises:
-        InputError: There is no mask; a file cannot be read, has the wrong size or several
-            pictures; a mask is faint, or labels are smoothed, too many, or half transparent.
+        InputError: There is no mask, or there are too many; a file cannot be read, has the wrong
+            size or several pictures; a mask is faint, or labels are smoothed, too many, or half
+            transparent.
     """
     path = Path(path)
     if not path.is_dir():
         file = _read(path, width, height)
         return label_regions(_labels(file, str(path)), str(path))
     regions, soft = list[Region](), list[str]()
-    for place in _mask_files(path):
+    files = _mask_files(path)
+    if not files:
+        raise InputError(f"{path}: the mask folder holds no picture; put one mask a layer in it")
+    check_count(len(files), f"masks in {path}")
+    for name, place in files:
         content, what = _read(place, width, height).content, f"{place}: the mask"
         values = content if isinstance(content, np.ndarray) else _mask(content)
         mask, several = inside(values, what)
-        regions.append(Region(_name(place), mask))
+        regions.append(Region(name, mask))
         soft += [str(place)] * several
     warn_of_soft(soft)
     return regions
 
 
-def _mask_files(folder: Path) -> list[Path]:
-    """Picture files of a folder in their order.
+def _mask_files(folder: Path, above: str = "") -> list[tuple[str, Path]]:
+    """Names of regions and their picture files, back to front, of a folder and those within.
+
+    Args:
+        folder: The folder.
+        above: Beginning of the names: "cat/" for the parts of a cat.
 
     Raises:
-        InputError: There is none, or the folder cannot be read.
+        InputError: A folder cannot be read, or lies too deep.
     """
+    if len(above) > NAME_MAX:
+        raise InputError(f"{folder}: the folder lies too deep; names have 1..{NAME_MAX} characters")
     try:
-        seen = [f for f in folder.iterdir() if not f.name.startswith(".")]
+        seen = sorted(f for f in folder.iterdir() if not f.name.startswith("."))
     except OSError as error:
         raise InputError(f"{folder}: cannot be read: {error.strerror}") from None
     files = [f for f in seen if f.suffix.lower() in TYPES and not f.is_dir()]
-    if not files:
-        raise InputError(f"{folder}: the mask folder holds no picture; put one mask a layer in it")
-    for other in sorted(f for f in seen if f.is_dir() or (is_picture(f) and f not in files)):
-        kind = "a folder among the masks" if other.is_dir() else "no type of masks"
-        logging.getLogger(__name__).warning("%s: %s; it is left out", other, kind)
-    return sorted(files, key=_stack_order)
+    found = [(_stack_order(f), 0, [(above + region_name(f), f)]) for f in files]
+    wholes = {region_name(f): f for f in reversed(files)}
+    for other in (f for f in seen if f not in files):
+        parts = []
+        if other.is_dir() and not other.is_symlink():
+            parts = _mask_files(other, f"{above}{region_name(other)}/")
+        if parts:
+            found.append((_stack_order(wholes.get(region_name(other), other)), 1, parts))
+        elif other.is_dir() or is_picture(other):
+            kind = "a folder without masks" if other.is_dir() else "no type of masks"
+            logging.getLogger(__name__).warning("%s: %s; it is left out", other, kind)
+    return [each for _, _, some in sorted(found, key=lambda v: v[:2]) for each in some]
+
+
+def _stem(file: Path) -> str:
+    return file.name if file.is_dir() else file.stem
 
 
 def _stack_order(file: Path) -> tuple[bool, list[tuple[int, str]], str]:
     """Sort key for natural order: `object 2` before `object 10`, the background before all."""
-    parts = re.findall(r"\d+|\D+", file.stem.lower())
-    natural = [(int(p), "") if p.isdecimal() else (-1, p) for p in parts]
-    return file.stem.lower() not in BACK_NAMES, natural, file.name
+    stem = _stem(file).lower()
+    natural = [(int(p), "") if p.isdecimal() else (-1, p) for p in re.findall(r"\d+|\D+", stem)]
+    return stem not in BACK_NAMES, natural, file.name
 
 
-def _name(file: Path) -> str:
-    """Name of a region: stem of its file without the number in front, at most 200 characters."""
-    stem = "".join(c if c.isprintable() else "?" for c in file.stem)
-    return re.sub(r"^\d+[ ._-]+(?=.)", "", stem)[:200]
+def region_name(file: Path) -> str:
+    """Name of a mask or folder: its stem without the number in front, not too long."""
+    stem = "".join(c if c.isprintable() else "?" for c in _stem(file))
+    return re.sub(r"^\d+[ ._-]+(?=.)", "", stem)[:NAME_MAX]
 
 
 def _read(path: Path, width: int, height: int) -> _File:

@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ..settings import LAYERS_MAX
 
 BACK_NAMES = ("back", "background")
+NAME_MAX = 200  # characters
 # Upper ends of the lightness of greys, and of the hue angle in Lab, in degrees.
 _GREYS = ((22, "black"), (40, "dark"), (70, "grey"), (88, "light"), (101, "white"))
 _HUES = ((10, "pink"), (47, "red"), (78, "orange"), (108, "yellow"), (165, "green"),
@@ -21,12 +23,17 @@ class Region:
     """Mask with a name, from which a layer is made.
 
     Attributes:
-        name: Name of the layer.
-        mask: bool [H, W], True for the pixels of the layer.
+        name: Name of the layer. ``cat/eye`` is a part of ``cat`` and follows it.
+        mask: bool [H, W], True for the pixels of the layer, also where others in front hide it.
     """
 
     name: str
     mask: NDArray[np.bool_]
+
+    @property
+    def parent(self) -> str | None:
+        """Name of what the region is a part of, or None."""
+        return parent_of(self.name)
 
 
 def resolve(
@@ -35,12 +42,12 @@ def resolve(
     width: int,
     support: NDArray[np.bool_] | None = None,
 ) -> list[Region]:
-    """Makes masks disjoint, so that their union is the picture or its support.
+    """Makes a stack of masks, so that their union is the picture or its support.
 
-    A pixel in several masks goes to the frontmost. Pixels in none go to the back layer of an
-    opaque picture, which is made if there is none, or to a new rearmost region `rest` of a
-    transparent one. A region named `back` or `background` is moved to the back. Names become
-    unique: `cat`, `cat 2`.
+    Masks stay as they are where others in front hide them: a pixel in several shows the frontmost.
+    Pixels in none go to the back layer of an opaque picture, which is made if there is none, or to
+    a new rearmost region `rest` of a transparent one. A region named `back` or `background` is
+    moved to the back. Names become unique: `cat`, `cat 2`.
 
     Args:
         regions: Regions back to front, with masks bool [height, width] that may overlap.
@@ -50,7 +57,7 @@ def resolve(
             of an opaque picture.
 
     Returns:
-        Disjoint, non-empty regions back to front; none if the support is empty.
+        Regions back to front, something of each visible; none if the support is empty.
 
     Raises:
         InputError: A mask has the wrong size, or nothing of it remains visible.
@@ -59,24 +66,51 @@ def resolve(
         check_size(f'mask "{region.name}"', region.mask, width, height)
     if support is not None:
         check_size("the support of the picture", support, width, height)
-    free = np.ones((height, width), np.bool_) if support is None else support.copy()
-    stack: list[Region] = []
-    front_to_back = list(regions)[::-1]
-    for region in sorted(front_to_back, key=_is_back):
-        stack.insert(0, Region(region.name, region.mask & free))
+    whole = np.ones((height, width), np.bool_) if support is None else support
+    ordered = sorted(regions, key=lambda r: not is_back(r.name))
+    stack = [Region(r.name, r.mask & whole) for r in ordered]
+    free = whole.copy()
+    for region in stack:
         free &= ~region.mask
-    if support is None and stack and _is_back(stack[0]):
+    if support is None and stack and is_back(stack[0].name):
         stack[0] = replace(stack[0], mask=stack[0].mask | free)
     elif free.any():
         stack.insert(0, Region("back" if support is None else "rest", free))
-    for region in stack:
-        if not region.mask.any():
+    for region, seen in zip(stack, visible(stack), strict=True):
+        if not seen.any():
             raise InputError(
                 f'mask "{region.name}" is empty, hidden by the masks in front of it or fully '
                 "outside the visible part; draw it where it can be seen, or leave it out"
             )
     names = unique_names(region.name for region in stack)
     return [replace(r, name=name) for r, name in zip(stack, names, strict=True)]
+
+
+def visible(regions: Sequence[Region]) -> list[NDArray[np.bool_]]:
+    """Visible parts bool [H, W] of regions that are given back to front: disjoint masks."""
+    masks: list[NDArray[np.bool_]] = []
+    covered: NDArray[np.bool_] | np.bool_ = np.False_
+    for region in reversed(regions):
+        masks.insert(0, region.mask & ~covered)
+        covered = covered | region.mask
+    return masks
+
+
+def parent_of(name: str) -> str | None:
+    """Name of what a part belongs to: `cat` for `cat/eye`; None for what is no part."""
+    return name.rpartition("/")[0] if all(name.split("/")) and "/" in name else None
+
+
+def groups_of(regions: Sequence[Region]) -> dict[str, str | None]:
+    """Parents that are no regions, with their own parents: `cat` if there is only `cat/eye`."""
+    names = {region.name for region in regions}
+    groups: dict[str, str | None] = {}
+    for region in regions:
+        above = region.parent
+        while above is not None and above not in names and above not in groups:
+            groups[above] = parent_of(above)
+            above = groups[above]
+    return groups
 
 
 def unique_names(names: Iterable[str]) -> list[str]:
@@ -138,8 +172,15 @@ def _colour_word(rgb: NDArray[np.float32]) -> str:
     return "brown" if word == "orange" and light < 50 else word
 
 
-def _is_back(region: Region) -> bool:
-    return region.name.lower() in BACK_NAMES
+def is_back(name: str) -> bool:
+    """Whether a region of this name belongs to the back."""
+    return name.lower() in BACK_NAMES
+
+
+def check_count(count: int, what: str) -> None:
+    """Raises `InputError` if there are more masks or layers than a picture can have."""
+    if count > LAYERS_MAX:
+        raise InputError(f"{count} {what} are too many; at most {LAYERS_MAX} are possible")
 
 
 def check_size(what: str, mask: NDArray[np.generic], width: int, height: int) -> None:

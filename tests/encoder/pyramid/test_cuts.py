@@ -55,19 +55,19 @@ def square(x0, y0, x1, y1):
     return Boundary(0, (np.stack([corners, corners, after], 1).reshape(-1, 2),))
 
 
-@pytest.mark.parametrize("hidden", [False, True])
-def test_only_boundaries_that_meet_the_box_cut(hidden):
-    """Its box reaches 2 px beyond what shows; a layer that does not show has the whole canvas."""
-    seen = np.zeros((40, 60), np.float32)
-    seen[10:20, 10:30] = not hidden
+@pytest.mark.parametrize("tiny", [False, True])
+def test_only_boundaries_that_meet_the_box_cut(tiny):
+    """Its box reaches 2 px beyond the layer; one that covers no sample has the whole canvas."""
+    covered = np.zeros((40, 60), np.float32)
+    covered[10:20, 10:30] = not tiny
     boundaries = [
         square(0, 0, 5, 5), square(10, 10, 30, 20), square(32, 10, 40, 20), square(31, 10, 40, 20),
         None, square(10, 22, 20, 30), square(0, 0, 9, 9),
     ]  # fmt: skip
-    box, cuts = _view(boundaries, 1, seen)
-    assert box == ((0, 0, 60, 40) if hidden else (8, 8, 24, 14))
+    box, cuts = _view(boundaries, 1, covered)
+    assert box == ((0, 0, 60, 40) if tiny else (8, 8, 24, 14))
     assert cuts.box == box
-    assert cuts.numbers(1, boundaries) == ([1, 2, 3, 5, 6] if hidden else [1, 3, 6])
+    assert cuts.numbers(1, boundaries) == ([1, 2, 3, 5, 6] if tiny else [1, 3, 6])
 
 
 def redness(picture):

@@ -141,7 +141,7 @@ def test_encode_takes_them_all_and_says_what_it_wants():
     fast = {"effort": 1, "jobs": 1}
     whole = pxi.encode(pixels, masks=LABELS, **fast)
     assert [layer.name for layer in whole.layers] == ["back", "object 1", "object 2"]
-    for masks in ([ONE & ~TWO, TWO], {"object 1": ONE, "object 2": TWO * 255}):
+    for masks in ([ONE & ~TWO, TWO], {"object 1": ONE & ~TWO, "object 2": TWO * 255}):
         assert pxi.encode(pixels, masks=masks, **fast).to_bytes() == whole.to_bytes()
     with pytest.raises(InputError, match=r"pass a list of arrays \[17, 22\]"):
         pxi.encode(pixels, masks=[3], **fast)

@@ -180,7 +180,7 @@ def test_what_is_no_mask_is_passed_over(tmp_path, caplog):
     assert not caplog.records
     (tmp_path / "more.png").mkdir()
     assert list(load(tmp_path)) == ["cat"]
-    assert "more.png: a folder among the masks; it is left out" in caplog.text
+    assert "more.png: a folder without masks; it is left out" in caplog.text
     for name in ("shapes.svg", "all.ora", "deep.exr"):
         (tmp_path / name).write_bytes(b"no mask")
     assert list(load(tmp_path)) == ["cat"]
@@ -188,6 +188,47 @@ def test_what_is_no_mask_is_passed_over(tmp_path, caplog):
     assert len(caplog.records) == 1 + 4
     (tmp_path / "cat.png").unlink()
     with pytest.raises(InputError, match="holds no picture"):
+        load(tmp_path)
+
+
+def test_a_folder_within_holds_parts_in_front_of_their_whole(tmp_path):
+    names = ["1 bush", "2 cat", "3 dog", "cat/2 pupil", "cat/1 eye", "2 cat/ear", "dog.v1/tail",
+             "cat/1 eye/glint", "0 sun/ray"]  # fmt: skip
+    for name in names:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        save(tmp_path / f"{name}.png", INSIDE * np.uint8(255))
+    assert list(load(tmp_path)) == [
+        "dog.v1/tail", "sun/ray", "bush", "cat", "cat/ear", "cat/eye", "cat/eye/glint",
+        "cat/pupil", "dog",
+    ]  # fmt: skip
+
+
+def test_folders_within_are_read_like_the_first(tmp_path, caplog):
+    (tmp_path / "cat" / ".hidden").mkdir(parents=True)
+    save(tmp_path / "cat" / "eye.png", INSIDE * np.uint8(255))
+    (tmp_path / "cat" / "notes.txt").write_text("not a mask")
+    assert list(load(tmp_path)) == ["cat/eye"]
+    assert not caplog.records
+    (tmp_path / "cat" / "again").symlink_to(tmp_path)
+    (tmp_path / "cat" / "deep.exr").write_bytes(b"no mask")
+    assert list(load(tmp_path)) == ["cat/eye"]
+    assert [r.args[0].name for r in caplog.records] == ["again", "deep.exr"]
+    save(tmp_path / "cat" / "eye.png", np.zeros((5, 9), np.uint8))
+    with pytest.raises(InputError, match=r"cat.eye\.png: the mask is 9x5"):
+        load(tmp_path)
+
+
+def test_hundreds_of_masks_are_refused_before_they_are_read(tmp_path):
+    for k in range(301):
+        (tmp_path / f"{k}.png").write_bytes(b"no picture")
+    with pytest.raises(InputError, match=r"301 masks in .* are too many; at most 64"):
+        load(tmp_path)
+
+
+def test_folders_without_end_are_refused(tmp_path):
+    deep = tmp_path.joinpath(*["a" * 40] * 6)
+    deep.mkdir(parents=True)
+    with pytest.raises(InputError, match="lies too deep"):
         load(tmp_path)
 
 

@@ -9,9 +9,11 @@ from hypothesis.extra import numpy as hnp
 from proxyimg_codec.encoder.shapes.masks import (
     Region,
     description,
+    groups_of,
     nearness,
     resolve,
     unique_names,
+    visible,
 )
 from proxyimg_codec.errors import InputError
 
@@ -27,18 +29,22 @@ def test_wrong_sizes_are_refused_with_both_sizes():
         resolve([Region("cat", np.ones((5, 9), np.bool_))], 6, 8)
 
 
-def test_overlaps_go_to_the_front_and_the_rest_to_a_new_back():
+def test_overlaps_stay_and_the_rest_goes_to_a_new_back():
     stack = resolve([Region("cat", box(0, 0, 4, 4)), Region("dog", box(2, 2, 6, 6))], 6, 8)
     assert [r.name for r in stack] == ["back", "cat", "dog"]
     np.testing.assert_array_equal(stack[2].mask, box(2, 2, 6, 6))
-    np.testing.assert_array_equal(stack[1].mask, box(0, 0, 4, 4) & ~box(2, 2, 6, 6))
+    np.testing.assert_array_equal(stack[1].mask, box(0, 0, 4, 4))
+    np.testing.assert_array_equal(stack[0].mask, ~(box(0, 0, 4, 4) | box(2, 2, 6, 6)))
+    seen = visible(stack)
+    np.testing.assert_array_equal(seen[1], box(0, 0, 4, 4) & ~box(2, 2, 6, 6))
+    np.testing.assert_array_equal(sum(seen), np.ones((6, 8)))
 
 
 def test_the_users_back_gets_the_rest_and_goes_first():
     user = [Region("cat", box(0, 0, 4, 4)), Region("Background", box(0, 0, 1, 8))]
     stack = resolve(user, 6, 8)
     assert [r.name for r in stack] == ["Background", "cat"]
-    np.testing.assert_array_equal(stack[0].mask, ~box(0, 0, 4, 4))
+    np.testing.assert_array_equal(stack[0].mask, ~box(0, 0, 4, 4) | box(0, 0, 1, 8))
 
 
 def test_full_cover_needs_no_back():
@@ -78,21 +84,35 @@ def test_inputs_stay_as_they_were():
     masks=st.lists(hnp.arrays(np.bool_, (4, 5)), max_size=4),
     support=st.none() | hnp.arrays(np.bool_, (4, 5)),
 )
-def test_a_stack_is_a_partition(masks, support):
+def test_what_is_visible_is_a_partition(masks, support):
     regions = [Region("x", m) for m in masks]
     try:
         stack = resolve(regions, 4, 5, support)
     except InputError:
         return
-    counts = sum((r.mask.astype(int) for r in stack), np.zeros((4, 5), int))
+    seen = visible(stack)
+    counts = sum((m.astype(int) for m in seen), np.zeros((4, 5), int))
     np.testing.assert_array_equal(counts, 1 if support is None else support.astype(int))
-    assert all(r.mask.any() for r in stack)
+    assert all(m.any() for m in seen)
+    whole = np.ones((4, 5), bool) if support is None else support
+    given = [m & whole for m in masks]
+    kept = [r.mask for r in stack if r.name.startswith("x")]
+    np.testing.assert_array_equal(kept, given)
     assert len({r.name for r in stack}) == len(stack)
 
 
 def test_names_are_numbered_without_taking_given_ones():
     assert unique_names(["cat", "cat", "dog", "cat"]) == ["cat", "cat 2", "dog", "cat 3"]
     assert unique_names(["cat", "cat", "cat 2"]) == ["cat", "cat 3", "cat 2"]
+
+
+def test_parts_follow_what_their_names_say():
+    names = ["cat", "cat/eye", "cat/eye/pupil", "dog/ear", "/a", "b/", "c//d", "dog/tail/tip"]
+    regions = [Region(name, box(0, 0, 1, 1)) for name in names]
+    above = [r.parent for r in regions]
+    assert above == [None, "cat", "cat/eye", "dog", None, None, None, "dog/tail"]
+    assert groups_of(regions) == {"dog": None, "dog/tail": "dog"}
+    assert groups_of(regions[:3]) == {}
 
 
 @pytest.mark.parametrize(
