@@ -7,6 +7,7 @@ A package offers a plug-in as an entry point in the group ``proxyimg_codec.KIND`
 
 Kinds:
     segmenters: `(rgb, max_layers, support) -> list[Region]`, as `encoder.shapes.segment.segment`.
+    prompters: `(rgb, prompts, jobs=1) -> list[Region]`, as `encoder.shapes.pointing.point_at`.
     meshers: `(boundary, size, edge) -> Base`, as `geometry.mesher.delaunay`.
     engines: `(texture, network, taps) -> float32 [N, channels]`, as `render.engines.run_numpy`.
     handles: `(picture) -> Image`: what functions below `api` give to those who call them directly.
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 BUILT_IN = {
     "segmenters": {"regions": "proxyimg_codec.encoder.shapes.segment:segment"},
+    "prompters": {"maps": "proxyimg_codec.encoder.shapes.pointing:point_at"},
     "meshers": {
         "delaunay": "proxyimg_codec.geometry.mesher:delaunay",
         "triwild": "proxyimg_codec.encoder.shapes.external_meshers:triwild",

@@ -99,13 +99,8 @@ def plan_layers(picture: Floats, settings: Settings, masks: Sequence[Region] | N
     if masks is not None:
         _check_masks(masks)
         regions = resolve(masks, height, width, support)
-    elif settings.max_layers == 1:
-        whole = np.ones((height, width), bool) if support is None else support
-        regions = [Region("picture", whole)]
     else:
-        rgb = np.rint(picture[..., :3] * 255).astype(np.uint8)
-        segment = plugins.find("segmenters", settings.segmenter)
-        regions = segment(rgb, settings.max_layers, support)
+        regions = _found(picture, settings, support)
     outline = alpha if not opaque and not soft and height * width <= FINE_PIXELS else None
     # The planes hold one alpha per sample, which overlapping layers would apply twice.
     overlap = 0 if soft and settings.pyramid else OVERLAP
@@ -120,6 +115,34 @@ def plan_layers(picture: Floats, settings: Settings, masks: Sequence[Region] | N
         mask = region.mask | (_dilate(region.mask, overlap) & front)
         layers.append(LayerPlan(region.name, _boundary(mask, outline, settings)))
     return Plan(tuple(layers), 4 if soft else 3, opaque)
+
+
+def regions_of_picture(picture: Floats, settings: Settings) -> list[Region]:
+    """Finds the regions of a picture by the segmenter.
+
+    Args:
+        picture: float32 [H, W, 4] in 0..1 with straight alpha.
+        settings: Settings of the encoder.
+
+    Returns:
+        Disjoint regions back to front; none if the picture is clear everywhere.
+
+    Raises:
+        UsageError: There is no such segmenter.
+    """
+    alpha = picture[..., 3]
+    return _found(picture, settings, None if (alpha == 1).all() else alpha >= 0.5)
+
+
+def _found(picture: Floats, settings: Settings, support: NDArray[np.bool_] | None) -> list[Region]:
+    """Regions that the segmenter finds, or the whole support if one layer is asked for."""
+    if settings.max_layers == 1:
+        whole = np.ones(picture.shape[:2], bool) if support is None else support
+        return [Region("picture", whole)]
+    rgb = np.rint(picture[..., :3] * 255).astype(np.uint8)
+    segment = plugins.find("segmenters", settings.segmenter)
+    regions: list[Region] = segment(rgb, settings.max_layers, support)
+    return regions
 
 
 def _boundary(mask: NDArray[np.bool_], outline: Floats | None, settings: Settings) -> Boundary:

@@ -62,10 +62,10 @@ def resolve(
     free = np.ones((height, width), np.bool_) if support is None else support.copy()
     stack: list[Region] = []
     front_to_back = list(regions)[::-1]
-    for region in sorted(front_to_back, key=_is_back):
+    for region in sorted(front_to_back, key=lambda region: is_back(region.name)):
         stack.insert(0, Region(region.name, region.mask & free))
         free &= ~region.mask
-    if support is None and stack and _is_back(stack[0]):
+    if support is None and stack and is_back(stack[0].name):
         stack[0] = replace(stack[0], mask=stack[0].mask | free)
     elif free.any():
         stack.insert(0, Region("back" if support is None else "rest", free))
@@ -138,8 +138,9 @@ def _colour_word(rgb: NDArray[np.float32]) -> str:
     return "brown" if word == "orange" and light < 50 else word
 
 
-def _is_back(region: Region) -> bool:
-    return region.name.lower() in BACK_NAMES
+def is_back(name: str) -> bool:
+    """Whether a region of this name belongs to the back."""
+    return name.lower() in BACK_NAMES
 
 
 def check_size(what: str, mask: NDArray[np.generic], width: int, height: int) -> None:
