@@ -84,7 +84,7 @@ def load_masks(path: str | Path, width: int, height: int) -> list[Region]:
         content, what = _read(place, width, height).content, f"{place}: the mask"
         values = content if isinstance(content, np.ndarray) else _mask(content)
         mask, several = inside(values, what)
-        regions.append(Region(_name(place), mask))
+        regions.append(Region(region_name(place), mask))
         soft += [str(place)] * several
     warn_of_soft(soft)
     return regions
@@ -116,7 +116,7 @@ def _stack_order(file: Path) -> tuple[bool, list[tuple[int, str]], str]:
     return file.stem.lower() not in BACK_NAMES, natural, file.name
 
 
-def _name(file: Path) -> str:
+def region_name(file: Path) -> str:
     """Name of a region: stem of its file without the number in front, at most 200 characters."""
     stem = "".join(c if c.isprintable() else "?" for c in file.stem)
     return re.sub(r"^\d+[ ._-]+(?=.)", "", stem)[:200]
