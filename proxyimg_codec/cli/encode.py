@@ -22,6 +22,7 @@ from .places import (
     each,
     parse,
 )
+from .prompt_flags import FLAGS, add_prompts, check_prompts, found_layers, pointed
 
 PRESET_NAMES = ("fast", "default", "best", "paper")
 
@@ -84,6 +85,7 @@ def _add_decomposition(p: argparse.ArgumentParser) -> None:
     add("--layers", type=int, choices=[1], help="1: one layer, no decomposition")
     add("--segmenter", metavar="NAME", help="who finds layers; default regions, "
         "others are added by plug-in packages")  # fmt: skip
+    add_prompts(p)
     add("--boundary", choices=["lsq", "chamfer"], help="boundary fit: least squares "
         "(default), or the slower adaptive Chamfer fit of the paper")  # fmt: skip
     add("--background", choices=["diffuse", "complete"], default="diffuse",
@@ -134,9 +136,11 @@ def check(args: argparse.Namespace) -> None:
     from ..errors import UsageError
 
     check_names(args.masks)
-    if args.masks is not None and len(args.inputs) > 1:
-        raise UsageError("--masks: they belong to one picture; encode each by itself")
+    one = [name for name in ("masks", *FLAGS) if getattr(args, name) is not None]
+    if one and len(args.inputs) > 1:
+        raise UsageError(f"--{one[0]}: belongs to one picture; encode each by itself")
     settings_from(args)
+    check_prompts(args)
 
 
 def encode_file(args: argparse.Namespace) -> None:
@@ -151,7 +155,7 @@ def encode_file(args: argparse.Namespace) -> None:
     if output == "-" and args.json:
         raise UsageError("--json and a picture cannot both go to standard output")
     check_suffix(output, args.force_suffix, "name it so, give several pictures a folder with -o")
-    check_target(output, args.force, *args.inputs, *mask_files(args.masks))
+    check_target(output, args.force, *args.inputs, *mask_files(args.masks), args.scribble)
     settings = settings_from(args)
 
     from ..codec.read import from_bytes
@@ -245,7 +249,10 @@ def encoded(source: bytes, args: argparse.Namespace, settings: Any, bar: Bar) ->
     picture = parse(source, name, frame=args.frame, clip=args.tone == "clip")
     picture = stripped(picture) if args.strip else picture
     height, width = picture.pixels.shape[:2]
-    masks = None if args.masks is None else load_masks(args.masks, width, height)
+    if pointed(args):
+        masks = found_layers(picture.pixels, args, settings.jobs)
+    else:
+        masks = None if args.masks is None else load_masks(args.masks, width, height)
     image = encode(picture.pixels, settings, masks=masks, blocks=picture.blocks, progress=progress)
     for note in () if args.quiet else picture.notes:
         print(f"pxi-encode: warning: {printable(name)}: {note}", file=sys.stderr)
@@ -267,7 +274,7 @@ def refuse_for_layers(args: argparse.Namespace) -> None:
     """
     from ..errors import UsageError
 
-    for name in ("masks", "layers", "max_layers", "segmenter", "frame", "tone"):
+    for name in ("masks", *FLAGS, "layers", "max_layers", "segmenter", "frame", "tone"):
         if getattr(args, name) is not None:
             flag = name.replace("_", "-")
             raise UsageError(f"--{flag}: the input has layers of its own, which are kept")
@@ -289,6 +296,8 @@ def settings_from(args: argparse.Namespace) -> Any:
         if aims:
             raise UsageError(f"--quality and --{aims[0].replace('_', '-')} contradict each other")
     rivals = [n for n in ("layers", "masks", "max_layers") if getattr(args, n) is not None]
+    if args.layers and pointed(args):
+        rivals.append(next(n for n in FLAGS if getattr(args, n)))
     if args.segmenter is not None and (args.layers or args.masks):
         rivals.append("segmenter")
     if len(rivals) > 1:

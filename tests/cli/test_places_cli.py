@@ -305,7 +305,7 @@ def test_a_missing_file_of_an_odd_name_is_one_line(tool, here, name):
 
 
 @pytest.mark.parametrize(
-    "name", ["encode", "decode", "edit", "animate", "info", "validate", "bench"]
+    "name", ["encode", "decode", "edit", "animate", "info", "validate", "bench", "layers"]
 )
 def test_refused_words_control_no_terminal(tool, here, name):
     words = ["rd"] if name == "bench" else []

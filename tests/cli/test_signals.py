@@ -133,7 +133,7 @@ def test_a_tool_runs_in_any_thread():
     assert codes == [0]
 
 
-TOOLS = ["animate", "bench", "decode", "edit", "encode", "info", "validate"]
+TOOLS = ["animate", "bench", "decode", "edit", "encode", "info", "layers", "validate"]
 
 
 def parsers(parser):
