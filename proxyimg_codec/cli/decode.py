@@ -175,8 +175,8 @@ def refuse_render_flags(args: argparse.Namespace) -> None:
     Raises:
         UsageError: A rendering flag is given.
     """
-    chosen = ("time", "no_background") if args.graph == "full" else ()
-    chosen += ("time",) if args.sheet is not None else ()
+    chosen = ["time", "no_background"] if args.graph == "full" else []
+    chosen += ["time"] if args.sheet is not None else []
     flags = ("scale", "fit", "width", "height", "region", "time", "no_background", "bit_depth",
              "srgb")  # fmt: skip
     for name in flags:

@@ -249,10 +249,9 @@ def encoded(source: bytes, args: argparse.Namespace, settings: Any, bar: Bar) ->
     picture = parse(source, name, frame=args.frame, clip=args.tone == "clip")
     picture = stripped(picture) if args.strip else picture
     height, width = picture.pixels.shape[:2]
+    masks = None if args.masks is None else load_masks(args.masks, width, height)
     if pointed(args):
         masks = found_layers(picture.pixels, args, settings.jobs)
-    else:
-        masks = None if args.masks is None else load_masks(args.masks, width, height)
     image = encode(picture.pixels, settings, masks=masks, blocks=picture.blocks, progress=progress)
     for note in () if args.quiet else picture.notes:
         print(f"pxi-encode: warning: {printable(name)}: {note}", file=sys.stderr)

@@ -99,7 +99,7 @@ def found_layers(pixels: Any, args: argparse.Namespace, jobs: int) -> list[Any]:
     from ..encoder.shapes.mask_files import load_masks
 
     height, width = pixels.shape[:2]
-    given = {
+    given: dict[str, Any] = {
         key: None if path is None else load_masks(path, width, height)
         for key, path in (("masks", args.masks), ("scribbles", args.scribble))
     }

@@ -31,14 +31,14 @@ def region_sheet(
     scale = reduction(height, width)
     size = max(1, round(width * scale)), max(1, round(height * scale))
     # A reduced pixel has the colour of what is visible in it.
-    alpha = cv2.resize(picture[..., 3], size, interpolation=cv2.INTER_AREA)
-    colour = cv2.resize(picture[..., :3] * picture[..., 3:], size, interpolation=cv2.INTER_AREA)
+    alpha = _reduced(picture[..., 3], size)
+    colour = _reduced(picture[..., :3] * picture[..., 3:], size)
     colour /= np.maximum(alpha, 1e-6)[..., None]
     planned = {
         layer.name: layer.boundary for layer in plan_layers(picture, settings, regions).layers
     }
     tiles = [
-        Tile(region.name, _bytes(colour, alpha * _reduced(region.mask, size)),
+        Tile(region.name, _bytes(colour, alpha * _reduced(region.mask.astype(np.float32), size)),
              outline_bytes(planned[region.name]))
         for region in regions
     ]  # fmt: skip
@@ -46,9 +46,8 @@ def region_sheet(
     return draw_sheet(whole if (alpha < 1).any() else whole[..., :3], tiles)
 
 
-def _reduced(mask: NDArray[np.bool_], size: tuple[int, int]) -> NDArray[np.float32]:
-    small = cv2.resize(mask.astype(np.float32), size, interpolation=cv2.INTER_AREA)
-    return np.asarray(small, np.float32)
+def _reduced(plane: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:
+    return np.asarray(cv2.resize(plane, size, interpolation=cv2.INTER_AREA), np.float32)
 
 
 def _bytes(colour: NDArray[np.float32], alpha: NDArray[np.float32]) -> NDArray[np.uint8]:

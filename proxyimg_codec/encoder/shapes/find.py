@@ -48,17 +48,15 @@ def find_layers(
         boxes: By name, the x, y, width and height of a box that holds an object.
         negatives: By name, points outside of an object.
         scribbles: Strokes over objects, as masks or labels: 0 is no stroke.
-        masks: Layers that there are already, as `encode` takes them. An object of the same name
-            replaces its mask, others come to lie in front of them.
+        masks: Layers that there are already, as `encode` takes them; new ones lie in front.
         refine: Names of `masks` that are to be improved, by points or without.
         max_layers: Most layers that a segmenter finds; 4 by default.
-        segmenter: Name of the segmenter, where nothing is pointed at.
+        segmenter: Name of who finds layers where nothing is pointed at; see `plugins`.
         prompter: Name of who finds what is pointed at; see `plugins`.
         jobs: Threads to use.
 
     Returns:
-        Regions back to front, disjoint, which `encode` takes as `masks`. What nobody named is the
-        first, ``back``.
+        Regions back to front, disjoint, for `encode`; what nobody named is the first, ``back``.
 
     Raises:
         InputError: The array cannot be a picture, or prompts or masks do not fit it or each other.
