@@ -46,7 +46,7 @@ WEIGHTS = {
     "away down": -1.033, "away across": -1.919, "frame": 0.112, "walk": 0.146, "shy walk": 0.375,
 }  # fmt: skip
 """Logistic regression of "belongs to the object that holds the point" on the measures of
-`Scene.likeness`: objects of photographs of the set `layers/coco`, at points well inside them."""
+`Scene.likeness`: `training/pointing.py` fits it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,11 +77,11 @@ class Scene:
 
     def likeness(self, row: int, column: int) -> Floats:
         """Probability, float64 [N], that basins belong to the object at a pixel of the copy."""
-        measures = self._measures(row, column)
+        measures = self.measures(row, column)
         score = sum(WEIGHTS[name] * values for name, values in measures.items())
         return np.asarray(1 / (1 + np.exp(-np.clip(score + WEIGHTS["bias"], -8, 8))))
 
-    def _measures(self, row: int, column: int) -> dict[str, Floats]:
+    def measures(self, row: int, column: int) -> dict[str, Floats]:
         """Measures float64 [N] that tell whether basins belong to the object at a pixel."""
         start = int(self.labels[row, column])
         path, highest = self._paths(start)
