@@ -36,6 +36,9 @@ INSIDE = 0.5
 SPREAD = 5
 """Most points that stand for strokes or for a box."""
 
+AGAINST = -2.0
+"""Logarithm of the odds of what is more like a point outside than like any inside, at most."""
+
 KEPT = 1.5
 """Logarithm of the odds that what a mask holds, before it is refined, belongs to the object."""
 
@@ -133,7 +136,8 @@ def _probable(scene: Scene, one: _Seeds, everyone: Sequence[_Seeds]) -> Floats:
     pooled = np.mean(odds, 0) if _only_box(one.prompt) else np.max(odds, 0)
     against = [_odds(scene.likeness(*p)) for p in one.against]
     if against:
-        pooled = pooled - np.maximum(np.max(against, 0), 0)
+        most = np.max(against, 0)
+        pooled = np.where(most > pooled, AGAINST, pooled) - np.logaddexp(0, most)
     prior = 1 / (1 + np.exp(-pooled))
     trust = TRUST * scene.area / scene.area.mean()
     rivals = [
