@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from .api import from_bytes as from_bytes
     from .api import open_image as open
     from .encoder.settings import Settings as Settings
+    from .encoder.shapes.find import find_layers as find_layers
     from .encoder.shapes.masks import Region as Region
 
 _LAZY = {
@@ -40,6 +41,7 @@ _LAZY = {
     "open": ("api", "open_image"),
     "from_bytes": ("api", "from_bytes"),
     "encode": ("api", "encode"),
+    "find_layers": ("encoder.shapes.find", "find_layers"),
     "Region": ("encoder.shapes.masks", "Region"),
     "Settings": ("encoder.settings", "Settings"),
 }
@@ -57,6 +59,7 @@ __all__ = [
     "UnsupportedError",
     "UsageError",
     "encode",
+    "find_layers",
     "from_bytes",
     "open",
 ]

@@ -32,6 +32,7 @@ KINDS = {
     "cli/test_colour_cli.py": ("encoder", ENCODE),
     "cli/test_encode_cli.py": ("encoder", ENCODE),
     "cli/test_models_cli.py": ("encoder", ENCODE),
+    "cli/test_layers_cli.py": ("encoder", ENCODE),
     "test_docs.py": ("encoder", ENCODE),
     "web": ("browser", ()),
 }
@@ -122,6 +123,15 @@ def pyramid(made_up_planes):
     from tests.support import pyramids
 
     return pyramids.picture()
+
+
+@pytest.fixture
+def plain_maps(monkeypatch) -> None:
+    """Maps of pictures are those of `tests.support.maps`, not of the network."""
+    from proxyimg_codec.encoder.shapes import pointing
+    from tests.support import maps
+
+    monkeypatch.setattr(pointing, "find_maps", maps.plain)
 
 
 @pytest.fixture(scope="session")

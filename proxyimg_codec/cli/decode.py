@@ -63,6 +63,8 @@ def arguments() -> argparse.ArgumentParser:
         "texture the synthesis of its colours")  # fmt: skip
     add("--graph", choices=["network", "full"], help="what --export-onnx writes: that (default), "
         "or the whole renderer, from points of the canvas to colour")  # fmt: skip
+    add("--sheet", metavar="FILE", help="draw all layers beside each other, with names, sizes and "
+        "the cost of outlines")  # fmt: skip
     add_limits(p)
     add("-f", "--force", action="store_true", help="replace files that exist")
     add("--quiet", action="store_true", help="print nothing but errors")
@@ -89,6 +91,8 @@ def check(args: argparse.Namespace) -> None:
         raise UsageError("--graph needs --export-onnx")
     if args.export_onnx is not None and len(args.inputs) > 1:
         raise UsageError("--export-onnx: of several pictures, export each by itself")
+    if args.sheet is not None and len(args.inputs) > 1:
+        raise UsageError("--sheet: of several pictures, draw that of each by itself")
 
 
 def decode_file(args: argparse.Namespace) -> Sequence[str]:
@@ -100,7 +104,8 @@ def decode_file(args: argparse.Namespace) -> Sequence[str]:
     Raises:
         PxiError: Anything that goes wrong, as the class that decides the exit code.
     """
-    rendering = args.output is not None or args.export_onnx is None
+    beside = [name for name in (args.export_onnx, args.sheet) if name is not None]
+    rendering = args.output is not None or not beside
     output = target(args) if rendering else ""
     kind = Path(output).suffix.lower()
     if kind == ".pxi":
@@ -111,10 +116,12 @@ def decode_file(args: argparse.Namespace) -> Sequence[str]:
         check_target(output, args.force, *args.inputs)
     else:
         refuse_render_flags(args)
-    if args.export_onnx is not None:
-        check_target(args.export_onnx, args.force, args.input)
-        if rendering and (output == args.export_onnx or same_file(output, args.export_onnx)):
-            raise UsageError(f"{output}: the picture and the ONNX model need two files")
+    for name in beside:
+        check_target(name, args.force, args.input)
+    files = [*beside, *([output] if rendering else [])]
+    for k, name in enumerate(files):
+        if any(name == other or same_file(name, other) for other in files[:k]):
+            raise UsageError(f"{name}: the picture, the sheet and the ONNX model need a file each")
 
     from ..api import open_image
     from ..native import kernel
@@ -126,6 +133,8 @@ def decode_file(args: argparse.Namespace) -> Sequence[str]:
             image = image.at(args.time)
         if args.export_onnx is not None:
             export(image, args)
+        if args.sheet is not None:
+            write_sheet(image, args)
         if rendering:
             draw(image, output, args)
     if rendering and not args.quiet:
@@ -166,14 +175,15 @@ def refuse_render_flags(args: argparse.Namespace) -> None:
     Raises:
         UsageError: A rendering flag is given.
     """
-    chosen = ("time", "no_background") if args.graph == "full" else ()
+    chosen = ["time", "no_background"] if args.graph == "full" else []
+    chosen += ["time"] if args.sheet is not None else []
     flags = ("scale", "fit", "width", "height", "region", "time", "no_background", "bit_depth",
              "srgb")  # fmt: skip
     for name in flags:
         value = getattr(args, name)
         if value is not None and value is not False and name not in chosen:
             raise UsageError(f"--{name.replace('_', '-')} needs an output picture")
-    if args.engine != "auto":
+    if args.engine != "auto" and args.sheet is None:
         raise UsageError("--engine needs an output picture")
 
 
@@ -224,6 +234,19 @@ def export(image: Any, args: argparse.Namespace) -> None:
     write_atomically(args.export_onnx, model.SerializeToString())
     if not args.quiet:
         print(f"{args.export_onnx}: ONNX opset {model.opset_import[0].version}", file=sys.stderr)
+
+
+def write_sheet(image: Any, args: argparse.Namespace) -> None:
+    """Draws all layers beside each other."""
+    from ..export.sheet import sheet_of
+    from ..io.color import COLOUR
+    from ..io.raster import write
+
+    colours = {k: v for k, v in image.blocks.items() if k in COLOUR}
+    sheet = sheet_of(image, args.engine, limits_of(args))
+    remark(args, args.sheet, write(args.sheet, sheet, colours))
+    if not args.quiet:
+        print(f"{printable(args.sheet)}: {len(image.layers)} layers", file=sys.stderr)
 
 
 def texture_model(image: Any, args: argparse.Namespace) -> Any:

@@ -22,6 +22,7 @@ from .places import (
     each,
     parse,
 )
+from .prompt_flags import FLAGS, add_prompts, check_prompts, found_layers, pointed
 
 PRESET_NAMES = ("fast", "default", "best", "paper")
 
@@ -86,6 +87,7 @@ def _add_decomposition(p: argparse.ArgumentParser) -> None:
         "by plug-in packages; or a model: an ONNX file, or a name of pxi-models")  # fmt: skip
     add("--depth", metavar="NAME", help="model of depth that puts found layers in order: an ONNX "
         "file, or a name of pxi-models")  # fmt: skip
+    add_prompts(p)
     add("--boundary", choices=["lsq", "chamfer"], help="boundary fit: least squares "
         "(default), or the slower adaptive Chamfer fit of the paper")  # fmt: skip
     add("--background", choices=["diffuse", "complete"], default="diffuse",
@@ -136,9 +138,11 @@ def check(args: argparse.Namespace) -> None:
     from ..errors import UsageError
 
     check_names(args.masks)
-    if args.masks is not None and len(args.inputs) > 1:
-        raise UsageError("--masks: they belong to one picture; encode each by itself")
+    one = [name for name in ("masks", *FLAGS) if getattr(args, name) is not None]
+    if one and len(args.inputs) > 1:
+        raise UsageError(f"--{one[0]}: belongs to one picture; encode each by itself")
     settings_from(args)
+    check_prompts(args)
 
 
 def encode_file(args: argparse.Namespace) -> None:
@@ -153,7 +157,7 @@ def encode_file(args: argparse.Namespace) -> None:
     if output == "-" and args.json:
         raise UsageError("--json and a picture cannot both go to standard output")
     check_suffix(output, args.force_suffix, "name it so, give several pictures a folder with -o")
-    check_target(output, args.force, *args.inputs, *mask_files(args.masks))
+    check_target(output, args.force, *args.inputs, *mask_files(args.masks), args.scribble)
     settings = settings_from(args)
 
     from ..codec.read import from_bytes
@@ -245,6 +249,8 @@ def encoded(source: bytes, args: argparse.Namespace, settings: Any, bar: Bar) ->
     picture = stripped(picture) if args.strip else picture
     height, width = picture.pixels.shape[:2]
     masks = None if args.masks is None else load_masks(args.masks, width, height)
+    if pointed(args):
+        masks = found_layers(picture.pixels, args, settings.jobs)
     image = encode(picture.pixels, settings, masks=masks, blocks=picture.blocks, progress=progress)
     for note in () if args.quiet else picture.notes:
         print(f"pxi-encode: warning: {printable(name)}: {note}", file=sys.stderr)
@@ -266,7 +272,7 @@ def refuse_for_layers(args: argparse.Namespace) -> None:
     """
     from ..errors import UsageError
 
-    for name in ("masks", "layers", "max_layers", "segmenter", "depth", "frame", "tone"):
+    for name in ("masks", *FLAGS, "layers", "max_layers", "segmenter", "depth", "frame", "tone"):
         if getattr(args, name) is not None:
             flag = name.replace("_", "-")
             raise UsageError(f"--{flag}: the input has layers of its own, which are kept")
@@ -288,6 +294,8 @@ def settings_from(args: argparse.Namespace) -> Any:
         if aims:
             raise UsageError(f"--quality and --{aims[0].replace('_', '-')} contradict each other")
     rivals = [n for n in ("layers", "masks", "max_layers") if getattr(args, n) is not None]
+    if args.layers and pointed(args):
+        rivals.append(next(n for n in FLAGS if getattr(args, n)))
     if args.layers or args.masks:
         rivals += [n for n in ("segmenter", "depth") if getattr(args, n) is not None]
     if len(rivals) > 1:

@@ -7,7 +7,7 @@ A package offers a plug-in as an entry point in the group ``proxyimg_codec.KIND`
 
 Kinds:
     segmenters: `(rgb, max_layers, support) -> list[Region]`, as `encoder.shapes.segment.segment`.
-    prompters: `(rgb, prompts) -> list[Region]`, a region for each `encoder.shapes.prompts.Prompt`.
+    prompters: `(rgb, prompts, jobs=1) -> list[Region]`, as `encoder.shapes.pointing.point_at`.
     depth: `(rgb) -> float32 [H, W]`, larger is nearer; any scale.
     meshers: `(boundary, size, edge) -> Base`, as `geometry.mesher.delaunay`.
     engines: `(texture, network, taps) -> float32 [N, channels]`, as `render.engines.run_numpy`.
@@ -26,7 +26,10 @@ if TYPE_CHECKING:
 
 BUILT_IN: dict[str, dict[str, str]] = {
     "segmenters": {"regions": "proxyimg_codec.encoder.shapes.segment:segment"},
-    "prompters": {"sam": "proxyimg_codec.encoder.shapes.external_models.prompting:prompted"},
+    "prompters": {
+        "maps": "proxyimg_codec.encoder.shapes.pointing:point_at",
+        "sam": "proxyimg_codec.encoder.shapes.external_models.prompting:prompted",
+    },
     "depth": {},
     "meshers": {
         "delaunay": "proxyimg_codec.geometry.mesher:delaunay",

@@ -305,7 +305,8 @@ def test_a_missing_file_of_an_odd_name_is_one_line(tool, here, name):
 
 
 @pytest.mark.parametrize(
-    "name", ["encode", "decode", "edit", "animate", "info", "validate", "bench", "models"]
+    "name",
+    ["encode", "decode", "edit", "animate", "info", "validate", "bench", "layers", "models"],
 )
 def test_refused_words_control_no_terminal(tool, here, name):
     words = {"bench": ["rd"], "models": ["list"]}.get(name, [])

@@ -133,7 +133,9 @@ def test_a_tool_runs_in_any_thread():
     assert codes == [0]
 
 
-TOOLS = ["animate", "bench", "decode", "edit", "encode", "info", "models", "validate"]
+TOOLS = [
+    "animate", "bench", "decode", "edit", "encode", "info", "layers", "models", "validate",
+]  # fmt: skip
 
 
 def parsers(parser):

@@ -108,16 +108,8 @@ def plan_layers(picture: Floats, settings: Settings, masks: Sequence[Region] | N
     if masks is not None:
         _check_masks(masks)
         regions = resolve(masks, height, width, support)
-    elif settings.max_layers == 1:
-        whole = np.ones((height, width), bool) if support is None else support
-        regions = [Region("picture", whole)]
     else:
-        rgb = np.rint(picture[..., :3] * 255).astype(np.uint8)
-        segment = find_segmenter(settings.segmenter, settings.jobs)
-        regions = segment(rgb, settings.max_layers, support)
-        if settings.depth is not None and len(regions) > 1:
-            depth = find_depth(settings.depth, settings.jobs)(rgb)
-            regions = ordered_by_depth(regions, depth, opaque)
+        regions = _found(picture, settings, support)
     outline = alpha if not opaque and not soft and height * width <= FINE_PIXELS else None
     check_count(len(regions), "layers, with what no mask covers,")
     # The planes hold one alpha per sample, which overlapping layers would apply twice.
@@ -162,6 +154,36 @@ def _continued(
     if solid is not None:
         hidden &= _eroded(solid & (mask | front), OVERLAP)
     return np.asarray(seen | hidden | more)
+
+
+def regions_of_picture(picture: Floats, settings: Settings) -> list[Region]:
+    """Finds the regions of a picture by the segmenter.
+
+    Args:
+        picture: float32 [H, W, 4] in 0..1 with straight alpha.
+        settings: Settings of the encoder.
+
+    Returns:
+        Disjoint regions back to front; none if the picture is clear everywhere.
+
+    Raises:
+        UsageError: There is no such segmenter.
+    """
+    alpha = picture[..., 3]
+    return _found(picture, settings, None if (alpha == 1).all() else alpha >= 0.5)
+
+
+def _found(picture: Floats, settings: Settings, support: NDArray[np.bool_] | None) -> list[Region]:
+    """Regions that the segmenter finds, or the whole support if one layer is asked for."""
+    if settings.max_layers == 1:
+        whole = np.ones(picture.shape[:2], bool) if support is None else support
+        return [Region("picture", whole)]
+    rgb = np.rint(picture[..., :3] * 255).astype(np.uint8)
+    regions = find_segmenter(settings.segmenter, settings.jobs)(rgb, settings.max_layers, support)
+    if settings.depth is not None and len(regions) > 1:
+        depth = find_depth(settings.depth, settings.jobs)(rgb)
+        regions = ordered_by_depth(regions, depth, opaque=support is None)
+    return regions
 
 
 def _boundary(mask: NDArray[np.bool_], outline: Floats | None, settings: Settings) -> Boundary:

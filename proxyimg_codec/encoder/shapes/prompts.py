@@ -13,6 +13,9 @@ from .masks import check_size
 
 Point = tuple[float, float]
 
+Box = tuple[float, float, float, float]
+"""x, y, width and height in pixels."""
+
 
 @dataclass(frozen=True, eq=False)
 class Prompt:
@@ -33,7 +36,7 @@ class Prompt:
     name: str
     inside: tuple[Point, ...] = ()
     outside: tuple[Point, ...] = ()
-    box: tuple[float, float, float, float] | None = None
+    box: Box | None = None
     strokes: NDArray[np.bool_] | None = None
     mask: NDArray[np.bool_] | None = None
 
@@ -77,12 +80,14 @@ def checked(prompts: Sequence[Prompt], height: int, width: int) -> list[Prompt]:
     return [replace(p, outside=(*p.outside, *_points_of_others(p, result))) for p in result]
 
 
+def are_parts(one: str, other: str) -> bool:
+    """Whether names are those of the same object, or of an object and a part: `cat`, `cat/eye`."""
+    return f"{one}/".startswith(f"{other}/") or f"{other}/".startswith(f"{one}/")
+
+
 def _points_of_others(prompt: Prompt, prompts: Sequence[Prompt]) -> list[Point]:
     """Points inside the objects that are apart from that of a prompt."""
-    name = prompt.name
-    apart = [p for p in prompts if p is not prompt]
-    apart = [p for p in apart if not f"{name}/".startswith(f"{p.name}/")]
-    apart = [p for p in apart if not f"{p.name}/".startswith(f"{name}/")]
+    apart = [p for p in prompts if not are_parts(p.name, prompt.name)]
     return [point for p in apart for point in p.inside]
 
 
@@ -108,7 +113,7 @@ def _checked(prompt: Prompt, height: int, width: int) -> Prompt:
     return prompt if prompt.box is None else replace(prompt, box=_clipped(prompt, height, width))
 
 
-def _clipped(prompt: Prompt, height: int, width: int) -> tuple[float, float, float, float]:
+def _clipped(prompt: Prompt, height: int, width: int) -> Box:
     """Part of the box of a prompt that lies in the picture."""
     x, y, wide, high = prompt.box or (0, 0, 0, 0)
     right, bottom = min(x + wide, width), min(y + high, height)
