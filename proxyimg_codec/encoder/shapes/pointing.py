@@ -36,6 +36,9 @@ INSIDE = 0.5
 SPREAD = 5
 """Most points that stand for strokes or for a box."""
 
+FILLED = 0.6
+"""Share of a box that an object fills, about."""
+
 AGAINST = -2.0
 """Logarithm of the odds of what is more like a point outside than like any inside, at most."""
 
@@ -133,7 +136,7 @@ def _probable(scene: Scene, one: _Seeds, everyone: Sequence[_Seeds]) -> Floats:
     odds = [_odds(scene.likeness(*p)) for p in one.points]
     if one.prior is not None:
         odds.append(one.prior)
-    pooled = np.mean(odds, 0) if _only_box(one.prompt) else np.max(odds, 0)
+    pooled = _in_box(np.mean(odds, 0), scene, one) if _only_box(one.prompt) else np.max(odds, 0)
     against = [_odds(scene.likeness(*p)) for p in one.against]
     if against:
         most = np.max(against, 0)
@@ -149,6 +152,15 @@ def _probable(scene: Scene, one: _Seeds, everyone: Sequence[_Seeds]) -> Floats:
         trust[basins], prior[basins] = CERTAIN, value
     walk = scene.laplacian(SHYNESS) + np.diag(trust)
     return np.asarray(np.linalg.solve(walk, trust * prior))
+
+
+def _in_box(odds: Floats, scene: Scene, one: _Seeds) -> Floats:
+    """Odds float64 [N] shifted so that the likeliest basins, `FILLED` of a box, are inside."""
+    held = np.setdiff1d(np.arange(len(odds)), sorted(one.outside))
+    falling = held[np.argsort(-odds[held], kind="stable")]
+    filled = np.cumsum(scene.area[falling])
+    last = falling[np.searchsorted(filled, FILLED * filled[-1])]
+    return np.asarray(odds - odds[last] + 1)
 
 
 def _only_box(prompt: Prompt) -> bool:

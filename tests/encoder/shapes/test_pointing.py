@@ -47,6 +47,11 @@ def test_a_box_bounds_its_object():
     assert not half[70:].any()
 
 
+def test_an_object_of_several_parts_fills_its_box():
+    (mask,) = found(Prompt("house", box=(12, 32, 56, 58)))
+    assert iou(mask, HOUSE) > 0.9
+
+
 def test_strokes_are_inside():
     strokes = np.zeros(TREE.shape, bool)
     strokes[30:80, 100] = True
