@@ -34,6 +34,7 @@ from benchmarks.composites import composites
 from proxyimg_codec import plugins
 from proxyimg_codec.bench.measure import psnr
 from proxyimg_codec.encoder.settings import Settings
+from proxyimg_codec.encoder.shapes.external_models.segmenters import find_segmenter
 from proxyimg_codec.encoder.shapes.hierarchy import partitions
 from proxyimg_codec.encoder.shapes.labels import label_regions
 from proxyimg_codec.encoder.shapes.maps import Maps, find_maps
@@ -58,10 +59,10 @@ COST_SOURCE = "kodim23"
 COST_RUNS = 3
 
 SEGMENT = """
-from proxyimg_codec import plugins
+from proxyimg_codec.encoder.shapes.external_models.segmenters import find_segmenter
 from proxyimg_codec.io import raster
 rgb = raster.read({path!r}).pixels[..., :3]
-segment = plugins.find("segmenters", {name!r})
+segment = find_segmenter({name!r})
 {call}
 """
 
@@ -87,7 +88,7 @@ def timed(segment: Segmenter, rgb: Pixels, layers: int) -> tuple[list[Region], f
 
 def coco(data: Path, name: str, count: int | None) -> Iterator[str]:
     """Yields how well layers match the things of pictures."""
-    segment = plugins.find("segmenters", name)
+    segment = find_segmenter(name)
     mean, first, seconds = list[float](), list[float](), list[float]()
     files = every([*(data / "layers" / "coco").glob("*.jpg")], 2, 1, count)
     for file in files:
@@ -108,7 +109,7 @@ def coco(data: Path, name: str, count: int | None) -> Iterator[str]:
 
 def bsds(data: Path, name: str, count: int | None) -> Iterator[str]:
     """Yields how well regions cover people's segmentations."""
-    segment = plugins.find("segmenters", name)
+    segment = find_segmenter(name)
     levels, own, regions_found, seconds = list[list[float]](), list[float](), list[int](), 0.0
     files = every([*(data / "layers" / "bsds").glob("*.jpg")], 5, 0, count)
     for file in files:
@@ -139,7 +140,7 @@ def bsds(data: Path, name: str, count: int | None) -> Iterator[str]:
 
 def composed(data: Path, name: str, count: int | None) -> Iterator[str]:
     """Yields whether sprites become layers, in the right order."""
-    segment = plugins.find("segmenters", name)
+    segment = find_segmenter(name)
     found, ordered, pairs, images = list[float](), list[bool](), 0, 0
     for image in composites(data, 60 if count is None else count):
         regions = segment(image.rgb, LAYERS, None)
@@ -262,7 +263,7 @@ def ranged(values: Sequence[float] | NDArray[np.float64]) -> str:
 
 def sheets(data: Path, folder: Path, name: str) -> None:
     """Writes a sheet of the layers of each of 18 pictures, numbered in the order of their names."""
-    segment = plugins.find("segmenters", name)
+    segment = find_segmenter(name)
     files = [*(data / "photo").glob("*.*"), *(data / "anime").glob("*.*")]
     files += [p for p in kodak(data) if p.stem[-2:] in SHEET_KODAK]
     folder.mkdir(parents=True, exist_ok=True)

@@ -83,7 +83,7 @@ def _add_decomposition(p: argparse.ArgumentParser) -> None:
     )
     add("--max-layers", type=int, metavar="N", help="most layers found; default 4")
     add("--layers", type=int, choices=[1], help="1: one layer, no decomposition")
-    add("--segmenter", metavar="NAME", help="who finds layers; default regions, others are added "
+    add("--segmenter", metavar="NAME", help="who finds layers; default figures, others are added "
         "by plug-in packages; or a model: an ONNX file, or a name of pxi-models")  # fmt: skip
     add("--depth", metavar="NAME", help="model of depth that puts found layers in order: an ONNX "
         "file, or a name of pxi-models")  # fmt: skip
@@ -252,7 +252,10 @@ def encoded(source: bytes, args: argparse.Namespace, settings: Any, bar: Bar) ->
     if pointed(args):
         masks = found_layers(picture.pixels, args, settings.jobs)
     image = encode(picture.pixels, settings, masks=masks, blocks=picture.blocks, progress=progress)
-    for note in () if args.quiet else picture.notes:
+    notes = [*picture.notes]
+    if masks is None and settings.max_layers > 1 and len(image.layers) == 1:
+        notes.append("no object was found: one layer; point at what is to be one (--point)")
+    for note in () if args.quiet else notes:
         print(f"pxi-encode: warning: {printable(name)}: {note}", file=sys.stderr)
     return image, picture.pixels
 

@@ -90,7 +90,7 @@ class Settings:
     target_size: float | None = None
     target_psnr: float | None = None
     max_layers: int = 4
-    segmenter: str = "regions"
+    segmenter: str = "figures"
     depth: str | None = None
     feature_bits: int | None = None
     net_bits: int | None = None

@@ -6,7 +6,7 @@ A package offers a plug-in as an entry point in the group ``proxyimg_codec.KIND`
     mine = "my_package:segment"
 
 Kinds:
-    segmenters: `(rgb, max_layers, support) -> list[Region]`, as `encoder.shapes.segment.segment`.
+    segmenters: `(rgb, max_layers, support) -> list[Region]`, as `encoder.shapes.figures.segment`.
     prompters: `(rgb, prompts, jobs=1) -> list[Region]`, as `encoder.shapes.pointing.point_at`.
     depth: `(rgb) -> float32 [H, W]`, larger is nearer; any scale.
     meshers: `(boundary, size, edge) -> Base`, as `geometry.mesher.delaunay`.
@@ -25,7 +25,10 @@ if TYPE_CHECKING:
     from importlib.metadata import EntryPoint, EntryPoints
 
 BUILT_IN: dict[str, dict[str, str]] = {
-    "segmenters": {"regions": "proxyimg_codec.encoder.shapes.segment:segment"},
+    "segmenters": {
+        "figures": "proxyimg_codec.encoder.shapes.figures:segment",
+        "regions": "proxyimg_codec.encoder.shapes.segment:segment",
+    },
     "prompters": {
         "maps": "proxyimg_codec.encoder.shapes.pointing:point_at",
         "sam": "proxyimg_codec.encoder.shapes.external_models.prompting:prompted",

@@ -1,8 +1,10 @@
-"""Default segmenter: what stands out in a picture, object by object, by the layers network.
+"""Default segmenter: the objects of a picture, by the maps of the layers network.
 
-Basins of the boundary map are merged to regions; those with a high mean on the figure map are
-figures. Figures that do not touch are different objects, and one is split only at strong boundaries
-where both sides are worth a layer. The rest is the back.
+Basins of the boundary map merge to a hierarchy, in which those of unlike figure scores stay apart
+longest. Each of its regions might be an object. How good a one it is, tell: whether its basins are
+likely parts of the same object (`pointing_scene`), whether it stands out, and how strong the
+boundary around it is. The best ones that leave room for each other become layers; the rest is the
+back.
 """
 
 from __future__ import annotations
@@ -11,30 +13,34 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .hierarchy import borders, hierarchy, merged, reduced
+from .hierarchy import Hierarchy, merged
 from .maps import Maps, find_maps
 from .masks import Region, description, unique_names
 from .order import back_to_front
+from .pointing_scene import Scene, scene_of
 from .refine import refined, spread
 
-Floats = NDArray[np.float32]
+Floats = NDArray[np.float64]
 Labels = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
-FINE = 0.15
-"""Strength of boundaries below which basins are one region."""
+SEEDS = 32
+"""Basins from which it is asked what belongs to the same object: the largest that stand out."""
 
-FIGURE, FAINT = 0.5, 0.3
-"""Mean on the figure map from which on a region is a figure; and that if else there were none."""
+GROUND = 0.1
+"""What a region that does not stand out at all is worth beside one that does."""
 
-SPLIT = 0.5
-"""Mean strength of a boundary that splits a figure."""
+SIZE = 0.2
+"""Power of the area of a region in its worth: large objects are worth a little more."""
 
-LEAST, SHARE = 0.01, 0.12
-"""Least area of an object, as a share of the picture and of the figure that it is split from."""
+WORTH = 0.08
+"""Least worth of a layer."""
 
-MOST = 0.92
-"""Share of an opaque picture that no figure covers; it would be the ground."""
+LEAST, MOST = 0.01, 0.92
+"""Least and greatest share of the picture of an object."""
+
+FREE = 0.5
+"""Least share of an object that better ones leave to it."""
 
 
 def segment(
@@ -55,107 +61,114 @@ def segment(
     whole = np.ones(rgb.shape[:2], np.bool_) if support is None else support
     if not whole.any():
         return []
-    maps = find_maps(rgb if support is None else _on_plain(rgb, whole))
-    labels = objects(maps, max_layers, support)
+    # Colours outside the support are arbitrary, and its outline is an edge whatever they are.
+    shown = np.where(whole[..., None], rgb, np.uint8(230))
+    maps = find_maps(shown)
+    rim = cv2.morphologyEx(whole.astype(np.uint8), cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))
+    maps.boundary[rim > 0] = 1
+    labels = objects(scene_of(shown, maps), max_layers, support)
     return layers(rgb, labels, maps, support)
 
 
-def _on_plain(rgb: NDArray[np.uint8], support: Mask) -> NDArray[np.uint8]:
-    """Picture whose colours outside the support, which are arbitrary, are one light grey."""
-    return np.where(support[..., None], rgb, np.uint8(230))
-
-
-def objects(maps: Maps, max_layers: int, support: Mask | None = None) -> Labels:
-    """Finds objects in maps.
+def objects(scene: Scene, max_layers: int, support: Mask | None = None) -> Labels:
+    """Finds objects in a scene.
 
     Args:
-        maps: Maps of the picture.
+        scene: Scene of the picture.
         max_layers: Most labels, at least 1.
         support: bool [H, W]; None for all of an opaque picture, whose label 0 is the back.
 
     Returns:
-        int [h, w] labels from 0 of a copy with at most `hierarchy.SIDE` pixels a side; -1 outside
-        of the support.
+        int [h, w] labels from 0, of the copy that the scene is; -1 outside of the support.
     """
-    boundary, figure = reduced(maps.boundary), reduced(maps.figure)
-    inside = None if support is None else reduced(support.astype(np.float32)) >= 0.5
-    if inside is not None:
-        figure = inside.astype(np.float32)
-    tree = hierarchy(boundary, inside)
-    fine = tree.cut(FINE)
-    count = int(fine.max()) + 1
-    area = np.bincount(fine.ravel(), minlength=count)
-    score = np.bincount(fine.ravel(), figure.ravel(), count) / area
-    chosen = score >= FIGURE
-    if area[chosen].sum() < LEAST * fine.size:
-        chosen = score >= FAINT
-    if inside is None and area[chosen].sum() > MOST * fine.size:
-        chosen[:] = False
-    parts = merged(fine, boundary, chosen.astype(np.intp)).cut(SPLIT)
-    return _kept(parts, chosen[fine], boundary, figure, max_layers, inside)
+    held = np.ones(len(scene.area), np.bool_)
+    figure = scene.figure
+    if support is not None:
+        size = scene.labels.shape[::-1]
+        small = cv2.resize(support.astype(np.float32), size, interpolation=cv2.INTER_AREA)
+        share = np.bincount(scene.labels.ravel(), small.ravel()) / scene.area
+        held = share >= min(0.5, float(share.max()))
+        figure = held.astype(np.float64)
+    regions = _regions(scene, figure, held)
+    worth = _worth(scene, figure, regions, held)
+    most = max_layers - 1 if support is None else max_layers
+    chosen = _chosen(scene, regions, worth, most, with_back=support is None)
+    of_basin = np.zeros(len(scene.area), np.intp) - (support is not None)
+    for number, region in enumerate(chosen, 1 if support is None else 0):
+        of_basin[region & (of_basin <= (0 if support is None else -1))] = number
+    labels = of_basin[scene.labels]
+    if support is not None:
+        labels = spread(labels) if chosen else np.zeros_like(labels)
+        labels[~held[scene.labels]] = -1
+    return np.unique(labels, return_inverse=True)[1].reshape(labels.shape) + int(labels.min())
 
 
-def _kept(
-    parts: Labels,
-    chosen: Mask,
-    boundary: Floats,
-    figure: Floats,
-    max_layers: int,
-    inside: Mask | None,
-) -> Labels:
-    """Reduces parts of figures to the objects that are worth a layer.
+def _regions(scene: Scene, figure: Floats, held: Mask) -> Mask:
+    """Regions that might be objects, bool [R, N]: the basins of each."""
+    look = figure[scene.labels].astype(np.float32)[..., None]
+    tree: Hierarchy = merged(scene.labels, scene.boundary, held.astype(np.intp), look)
+    count = tree.count
+    regions = np.zeros((count + len(tree.merges), count), np.bool_)
+    regions[:count] = np.eye(count, dtype=np.bool_)
+    for k, (a, b) in enumerate(tree.merges):
+        regions[count + k] = regions[a] | regions[b]
+    area = regions @ scene.area / scene.area[held].sum()
+    most = MOST if held.all() else 1.0
+    return np.asarray(regions[(area >= LEAST) & (area <= most) & (regions @ held)])
+
+
+def _worth(scene: Scene, figure: Floats, regions: Mask, held: Mask) -> Floats:
+    """Worth of regions as objects, float64 [R].
 
     Args:
-        parts: int [h, w], parts of figures and of the ground.
-        chosen: bool [h, w], True on figures.
-        boundary: float32 [h, w].
-        figure: float32 [h, w].
-        max_layers: Most labels.
-        inside: bool [h, w] support, or None.
-
-    Returns:
-        int [h, w], 0 for the back of an opaque picture; -1 outside of the support.
+        scene: The scene.
+        figure: float64 [N], how much basins stand out.
+        regions: bool [R, N].
+        held: bool [N], basins of the support.
     """
-    labels = np.where(chosen if inside is None else inside, parts + 1, 0)
-    labels = np.unique(np.append(labels, 0), return_inverse=True)[1][:-1].reshape(parts.shape)
-    figures = cv2.connectedComponents((labels > 0).astype(np.uint8), connectivity=4)[1]
-    whole = np.bincount(figures.ravel())
-    most = max_layers - 1 if inside is None else max_layers
-    least = 0 if inside is None else 1  # what is visible belongs to some layer
-    while (count := int(labels.max())) > least:
-        area = np.bincount(labels.ravel(), minlength=count + 1)[1:]
-        weight = np.bincount(labels.ravel(), figure.ravel(), count + 1)[1:]
-        of_figure = np.zeros(count + 1, np.intp)
-        of_figure[labels] = figures
-        small = area < np.maximum(LEAST * labels.size, SHARE * whole[of_figure[1:]])
-        rank = weight + small * -1e9
-        worst = int(rank.argmin()) + 1
-        if not small[worst - 1] and count <= most:
+    weight = np.where(held, scene.area * (figure + GROUND / 2), 0)
+    seeds = np.argsort(-weight, kind="stable")[: min(SEEDS, int((weight > 0).sum()))]
+    alike = np.stack([scene.likeness(*scene.middle(int(s))) for s in seeds])
+    area = scene.area / scene.area.sum()
+    # Likely parts by all seeds that a region holds, the larger ones counting more.
+    share = regions[:, seeds] * area[seeds]
+    total = share.sum(1, keepdims=True)
+    likely = share @ alike / np.maximum(total, 1e-12)
+    size = regions @ area
+    inside = (likely * regions) @ area
+    match = inside / (size + likely @ area - inside)
+    standing = regions @ (area * figure) / size
+    strength = np.where(scene.shared > 0, scene.strength, 0)
+    length = ((regions @ scene.shared) * ~regions).sum(1)
+    edge = ((regions @ (scene.shared * strength)) * ~regions).sum(1) / np.maximum(length, 1)
+    worth = match * (standing + GROUND) * edge * size**SIZE
+    return np.asarray(np.where(total[:, 0] > 0, worth, 0))
+
+
+def _chosen(scene: Scene, regions: Mask, worth: Floats, most: int, with_back: bool) -> list[Mask]:
+    """Best regions, bool [N] each, without what better ones hold.
+
+    Args:
+        scene: The scene.
+        regions: bool [R, N].
+        worth: float64 [R].
+        most: Most regions.
+        with_back: Whether something has to be left for the back.
+    """
+    taken = np.zeros(len(scene.area), np.bool_)
+    chosen = list[Mask]()
+    least = LEAST * scene.area.sum()
+    for i in np.argsort(-worth, kind="stable"):
+        if len(chosen) >= most or worth[i] < WORTH:
             break
-        labels = _without(labels, worst, boundary, keep=inside is not None)
-    return labels if inside is None else np.where(inside, labels - 1, -1)
-
-
-def _without(labels: Labels, worst: int, boundary: Floats, keep: bool) -> Labels:
-    """Joins a part to the neighbour across the weakest boundary; to the back if it has none.
-
-    Args:
-        labels: int [h, w], parts from 1, 0 elsewhere.
-        worst: The part.
-        boundary: float32 [h, w].
-        keep: Whether a part without neighbours joins the nearest one.
-    """
-    pairs, lengths, sums = borders(labels, boundary)
-    beside = (pairs == worst).any(1) & (pairs > 0).all(1)
-    target = 0
-    if beside.any():
-        best = int(np.where(beside, sums / lengths, np.inf).argmin())
-        target = int(pairs[best].sum()) - worst
-    elif keep:
-        others = spread(np.where((labels > 0) & (labels != worst), labels, -1))
-        target = int(np.bincount(others[labels == worst]).argmax())
-    joined = np.where(labels == worst, target, labels)
-    return joined - (joined > worst)
+        free = regions[i] & ~taken
+        area = float(scene.area[free].sum())
+        if with_back and scene.area[~(taken | free)].sum() < least:
+            continue
+        if area >= max(least, FREE * float(scene.area[regions[i]].sum())):
+            taken |= free
+            chosen.append(free)
+    return chosen
 
 
 def layers(
@@ -172,9 +185,8 @@ def layers(
     whole = np.ones(rgb.shape[:2], np.bool_) if support is None else support
     full = refined(spread(labels), rgb, whole)
     masks = [whole & (full == i) for i in range(int(labels.max()) + 1)]
-    masks = [mask for k, mask in enumerate(masks) if mask.any() or (k == 0 and support is None)]
-    first = masks[:1] if support is None else []
-    stack = first + back_to_front(masks[len(first) :], maps)
+    first = masks[:1] if support is None and masks[0].any() else []
+    stack = first + back_to_front([m for m in masks[len(first) :] if m.any()], maps)
     names = [description(rgb, mask) for mask in stack]
     if support is None:
         names[0] = "back"

@@ -14,13 +14,14 @@ from ...errors import UsageError
 from ...io.samples import to_float
 from ...texture.network import Floats
 from ..settings import Settings
+from .external_models.locate import first_here
 from .layers import regions_of_picture
 from .mask_arrays import Masks, regions_of
 from .masks import Region, is_back, resolve
 from .prompts import Box, Point, Prompt, checked
 
 PROMPTER = "maps"
-"""Prompter by default."""
+"""Prompter where no model of the SAM family is installed."""
 
 
 def find_layers(
@@ -103,7 +104,8 @@ def with_objects(
         picture: float32 [H, W, 4] in 0..1 with straight alpha.
         old: Layers that there are, back to front.
         prompts: Prompts, one an object.
-        prompter: Name of who finds the objects; see `plugins`.
+        prompter: Name of who finds the objects, see `plugins`; by default a model of the SAM family
+            if one is here (`pxi-models`), else the built-in maps.
         jobs: Threads to use.
 
     Returns:
@@ -114,7 +116,7 @@ def with_objects(
         UsageError: There is no such prompter.
     """
     height, width = picture.shape[:2]
-    find = plugins.find("prompters", prompter or PROMPTER)
+    find = plugins.find("prompters", prompter or ("sam" if first_here("sam") else PROMPTER))
     rgb = np.rint(picture[..., :3] * 255).astype(np.uint8)
     prompts = _against_back(prompts, height, width)
     found = find(rgb, prompts, jobs=jobs) if prompts else []

@@ -140,8 +140,13 @@ def _stack_order(file: Path) -> tuple[bool, list[tuple[int, str]], str]:
 
 
 def region_name(file: Path) -> str:
-    """Name of a mask or folder: its stem without the number in front, not too long."""
-    stem = "".join(c if c.isprintable() else "?" for c in _stem(file))
+    """Name of the region of a mask or folder."""
+    return name_of_stem(_stem(file))
+
+
+def name_of_stem(stem: str) -> str:
+    """Name of a region: a stem without the number in front, not too long."""
+    stem = "".join(c if c.isprintable() else "?" for c in stem)
     return re.sub(r"^\d+[ ._-]+(?=.)", "", stem)[:NAME_MAX]
 
 

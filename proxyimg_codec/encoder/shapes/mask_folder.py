@@ -14,11 +14,11 @@ from PIL import Image
 
 from ...errors import InputError
 from ...io.files import temporary_name, write_atomically
-from .mask_files import TYPES, region_name
+from .mask_files import TYPES, name_of_stem
 from .masks import Region
 
-_OWN = re.compile(r"\d+ .+\.png")
-"""Names of files that `write_masks` makes."""
+_OWN = re.compile(r"(\d+ [^/]+/)*\d+ [^/]+\.png")
+"""Names, within the folder, of files that `write_masks` makes."""
 
 _BITS_AND_KIND = b"\x01\x00"
 """Bits a sample and colour type in the head of the PNG files that `write_masks` makes."""
@@ -26,6 +26,9 @@ _BITS_AND_KIND = b"\x01\x00"
 
 def write_masks(folder: Path, regions: Sequence[Region], replace: bool = False) -> list[Path]:
     """Writes a folder of masks with one PNG file of one bit a pixel for each region.
+
+    Parts such as ``cat/eye`` go to a folder within, beside the mask of ``cat``; so they are read
+    back right in front of it.
 
     Args:
         folder: The folder. If it exists, masks are added to the files there are.
@@ -39,27 +42,53 @@ def write_masks(folder: Path, regions: Sequence[Region], replace: bool = False) 
         InputError: The folder cannot be written; it holds masks already, or pictures that would
             be read as masks; or a name cannot be that of a file.
     """
-    names = [f"{k:0{len(str(len(regions) - 1))}} {r.name}.png" for k, r in enumerate(regions)]
-    for name, region in zip(names, regions, strict=True):
-        if region_name(Path(name)) != region.name or "\\" in name:
-            raise InputError(
-                f'{folder}: "{region.name}" cannot be the name of a mask file; begin the name '
-                "with a letter, and use neither / nor \\"
-            )
+    names = _names(folder, regions)
     old = _old_masks(folder, replace)
     files = [_png(region) for region in regions]
     try:
         if folder.is_dir():
             for name, data in zip(names, files, strict=True):
+                (folder / name).parent.mkdir(parents=True, exist_ok=True)
                 write_atomically(folder / name, data)
             for file in old:
-                if file.name not in names:
+                if file.relative_to(folder).as_posix() not in names:
                     file.unlink()
+                    _remove_empty(file.parent, folder)
         else:
             _write_new(folder, dict(zip(names, files, strict=True)))
     except OSError as error:
         raise InputError(f"{folder}: cannot be written: {error.strerror}") from None
     return [folder / name for name in names]
+
+
+def _names(folder: Path, regions: Sequence[Region]) -> list[str]:
+    """Names of the files of regions within the folder.
+
+    Raises:
+        InputError: The name of a region cannot be that of a file.
+    """
+    digits = len(str(len(regions) - 1))
+    number = {region.name: k for k, region in enumerate(regions)}
+    names = []
+    for k, region in enumerate(regions):
+        parts, above = list[str](), ""
+        for part in region.name.split("/"):
+            above = f"{above}/{part}".removeprefix("/")
+            parts.append(f"{number.setdefault(above, k):0{digits}} {part}")
+            if name_of_stem(parts[-1]) != part or "\\" in part:
+                raise InputError(
+                    f'{folder}: "{region.name}" cannot be the name of a mask file; begin names '
+                    "with a letter, and leave \\ out"
+                )
+        names.append("/".join(parts) + ".png")
+    return names
+
+
+def _remove_empty(folder: Path, top: Path) -> None:
+    """Removes folders below `top` that hold nothing any more."""
+    while folder != top and not any(folder.iterdir()):
+        folder.rmdir()
+        folder = folder.parent
 
 
 def _old_masks(folder: Path, replace: bool) -> list[Path]:
@@ -71,11 +100,11 @@ def _old_masks(folder: Path, replace: bool) -> list[Path]:
     if not folder.exists():
         return []
     try:
-        seen = sorted(f for f in folder.iterdir() if not f.name.startswith("."))
+        seen = sorted(f for f in folder.rglob("*") if not f.name.startswith("."))
     except OSError as error:
         raise InputError(f"{folder}: cannot be read: {error.strerror}") from None
     pictures = [f for f in seen if f.suffix.lower() in TYPES and f.is_file()]
-    others = [f for f in pictures if not _is_own(f)]
+    others = [f for f in pictures if not _is_own(f, f.relative_to(folder).as_posix())]
     if others:
         raise InputError(
             f"{others[0]}: was not written by this tool, and would be read as a mask; choose an "
@@ -86,8 +115,8 @@ def _old_masks(folder: Path, replace: bool) -> list[Path]:
     return pictures
 
 
-def _is_own(file: Path) -> bool:
-    if not _OWN.fullmatch(file.name):
+def _is_own(file: Path, name: str) -> bool:
+    if not _OWN.fullmatch(name):
         return False
     with file.open("rb") as content:
         return content.read(26)[24:] == _BITS_AND_KIND
@@ -105,6 +134,7 @@ def _write_new(folder: Path, files: dict[str, bytes]) -> None:
     try:
         temporary.mkdir()
         for name, data in files.items():
+            (temporary / name).parent.mkdir(parents=True, exist_ok=True)
             (temporary / name).write_bytes(data)
         os.rename(temporary, folder)
     finally:

@@ -81,6 +81,12 @@ class Scene:
         score = sum(WEIGHTS[name] * values for name, values in measures.items())
         return np.asarray(1 / (1 + np.exp(-np.clip(score + WEIGHTS["bias"], -8, 8))))
 
+    def middle(self, basin: int) -> tuple[int, int]:
+        """Row and column of the pixel of a basin that is nearest to its centre."""
+        rows, columns = np.nonzero(self.labels == basin)
+        nearest = int(np.hypot(*(np.stack([rows, columns], 1) - self.centre[basin]).T).argmin())
+        return int(rows[nearest]), int(columns[nearest])
+
     def measures(self, row: int, column: int) -> dict[str, Floats]:
         """Measures float64 [N] that tell whether basins belong to the object at a pixel."""
         start = int(self.labels[row, column])

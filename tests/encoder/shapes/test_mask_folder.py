@@ -24,6 +24,8 @@ def regions(*names):
         ["rest", "2 cats", "10", "1.5 kg", "Größe é", "猫", "a=b", "a.png", "cat 2", "x" * 200],
         [f"object {k}" for k in range(12)],
         ["only"],
+        ["back", "cat", "cat/eye", "cat/eye/pupil", "cat/ear.s", "dog"],
+        ["back", "herd/cow", "herd/calf", "tree"],
     ],
 )
 def test_the_same_layers_are_read_in_the_same_order(tmp_path, names):
@@ -36,7 +38,7 @@ def test_the_same_layers_are_read_in_the_same_order(tmp_path, names):
         assert (one.mask == two.mask).all()
 
 
-@pytest.mark.parametrize("name", ["cat/eye", "..", " cat", "-x", "_a", "a\\b", "猫" * 100])
+@pytest.mark.parametrize("name", ["cat/..", "cat/", "..", " cat", "-x", "_a", "a\\b", "猫" * 100])
 def test_names_that_no_file_can_have_are_refused(tmp_path, name):
     with pytest.raises(InputError, match=r"masks: .*(name|cannot be written)"):
         write_masks(tmp_path / "masks", regions("back", name))
@@ -53,13 +55,22 @@ def test_masks_of_an_earlier_run_are_replaced_when_asked(tmp_path):
     assert names == ["0 back.png", "1 c.png", "notes.txt"]
 
 
-@pytest.mark.parametrize("name", ["photo.jpg", "1 cat.png", "cat.webp"])
+def test_folders_of_parts_are_replaced_too(tmp_path):
+    write_masks(tmp_path, regions("back", "cat", "cat/eye", "dog/ear"))
+    (tmp_path / "3 dog" / "notes.txt").write_text("kept")
+    write_masks(tmp_path, regions("back", "cat"), replace=True)
+    assert [r.name for r in load_masks(tmp_path, W, H)] == ["back", "cat"]
+    assert sorted(f.name for f in tmp_path.iterdir()) == ["0 back.png", "1 cat.png", "3 dog"]
+
+
+@pytest.mark.parametrize("name", ["photo.jpg", "1 cat.png", "cat.webp", "1 cat/eye.png"])
 def test_pictures_of_others_are_never_replaced(tmp_path, name):
+    (tmp_path / name).parent.mkdir(exist_ok=True)
     Image.new("RGB", (W, H), "red").save(tmp_path / name)
     before = (tmp_path / name).read_bytes()
     with pytest.raises(InputError, match=name):
         write_masks(tmp_path, regions("back", "cat"), replace=True)
-    assert [f.name for f in tmp_path.iterdir()] == [name]
+    assert [f.relative_to(tmp_path).as_posix() for f in tmp_path.rglob("*.*")] == [name]
     assert (tmp_path / name).read_bytes() == before
 
 
