@@ -43,7 +43,7 @@ def test_prompters_and_depth_are_kinds():
 
 @pytest.mark.encoder
 def test_added_segmenters_are_used(added):
-    assert plugins.names("segmenters") == ["regions", "halves"]
+    assert plugins.names("segmenters") == ["figures", "regions", "halves"]
     image = pxi.encode(smooth(40, 30), segmenter="halves", effort=1, jobs=1)
     assert [v.name for v in image.layers] == ["right", "left"]
 

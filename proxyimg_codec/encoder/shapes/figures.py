@@ -33,7 +33,7 @@ GROUND = 0.1
 SIZE = 0.2
 """Power of the area of a region in its worth: large objects are worth a little more."""
 
-WORTH = 0.08
+WORTH = 0.03
 """Least worth of a layer."""
 
 LEAST, MOST = 0.01, 0.92
@@ -141,7 +141,10 @@ def _worth(scene: Scene, figure: Floats, regions: Mask, held: Mask) -> Floats:
     strength = np.where(scene.shared > 0, scene.strength, 0)
     length = ((regions @ scene.shared) * ~regions).sum(1)
     edge = ((regions @ (scene.shared * strength)) * ~regions).sum(1) / np.maximum(length, 1)
-    worth = match * (standing + GROUND) * edge * size**SIZE
+    # A part of a figure has more of it beside itself.
+    beside = ((regions @ (scene.shared * figure)) * ~regions).sum(1) / np.maximum(length, 1)
+    contrast = (standing + GROUND) * (1 + GROUND - beside)
+    worth = match * contrast * edge * size**SIZE
     return np.asarray(np.where(total[:, 0] > 0, worth, 0))
 
 

@@ -1,7 +1,8 @@
 """Maps of a picture by the layers network: what stands out, where its edges are, who is in front.
 
-The network (`models/layers-1.onnx.zst`; `training/layers.py` makes it) sees the picture at two
-sizes. What stands out is judged as a whole, in a small copy; edges are found in a larger one.
+The network (`models/layers-1.onnx.zst`; `training/layers.py` makes it) sees small copies of the
+picture and their mirror images. What stands out is judged in one that shows it as a whole, edges
+in a larger one and in its half.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ MULTIPLE = 32
 """Sides of what the network sees are multiples of this."""
 
 SMALL, LARGE = 384, 768
-"""Longer side, in pixels, of the copies in which figures and boundaries are sought."""
+"""Longest sides, in pixels, of the copies in which figures and boundaries are sought."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,9 +49,19 @@ def find_maps(rgb: NDArray[np.uint8], jobs: int = 1) -> Maps:
         rgb: uint8 [H, W, 3] picture in sRGB.
         jobs: Threads to use.
     """
-    small = _run(rgb, SMALL, jobs)
-    large = _run(rgb, LARGE, jobs)
-    return Maps(small[0], large[1], np.ascontiguousarray(large[2:].transpose(1, 2, 0)))
+    side = min(LARGE, max(rgb.shape[:2]))
+    copies = {n: _both_ways(rgb, n, jobs) for n in {min(SMALL, side), side, max(1, side // 2)}}
+    # Edges of texture are weaker in the copy of half the size, those of objects are not.
+    edges = np.asarray((copies[side] + copies[max(1, side // 2)]) / 2, np.float32)
+    owner = np.ascontiguousarray(edges[2:].transpose(1, 2, 0))
+    return Maps(copies[min(SMALL, side)][0], edges[1], owner)
+
+
+def _both_ways(rgb: NDArray[np.uint8], side: int, jobs: int) -> Floats:
+    """Mean of the maps of a picture and of its mirror image, float32 [4, H, W]; see `_run`."""
+    mirrored = _run(np.ascontiguousarray(rgb[:, ::-1]), side, jobs)[..., ::-1]
+    mirrored[2] *= -1
+    return np.asarray((_run(rgb, side, jobs) + mirrored) / 2)
 
 
 def _run(rgb: NDArray[np.uint8], side: int, jobs: int) -> Floats:

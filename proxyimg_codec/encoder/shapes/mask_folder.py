@@ -20,6 +20,9 @@ from .masks import Region
 _OWN = re.compile(r"(\d+ [^/]+/)*\d+ [^/]+\.png")
 """Names, within the folder, of files that `write_masks` makes."""
 
+_OWN_FOLDER = re.compile(r"\d+ .+")
+"""Names of folders of parts that it makes."""
+
 _BITS_AND_KIND = b"\x01\x00"
 """Bits a sample and colour type in the head of the PNG files that `write_masks` makes."""
 
@@ -100,7 +103,9 @@ def _old_masks(folder: Path, replace: bool) -> list[Path]:
     if not folder.exists():
         return []
     try:
-        seen = sorted(f for f in folder.rglob("*") if not f.name.startswith("."))
+        seen = sorted(f for f in folder.iterdir() if not f.name.startswith("."))
+        within = [f for f in seen if _OWN_FOLDER.fullmatch(f.name) and f.is_dir()]
+        seen += sorted(f for part in within for f in part.rglob("*") if not f.name.startswith("."))
     except OSError as error:
         raise InputError(f"{folder}: cannot be read: {error.strerror}") from None
     pictures = [f for f in seen if f.suffix.lower() in TYPES and f.is_file()]

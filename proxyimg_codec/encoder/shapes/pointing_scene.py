@@ -41,9 +41,9 @@ LINE = 48
 """Places at which the boundary is looked at along a line."""
 
 WEIGHTS = {
-    "bias": 3.171, "path": 0.344, "highest": -3.164, "colour": -0.609, "figure difference": -1.19,
-    "figure": 0.932, "figure there": 0.535, "line": 0.448, "line top": -2.557, "away": -1.672,
-    "away down": -1.033, "away across": -1.919, "frame": 0.112, "walk": 0.146, "shy walk": 0.375,
+    "bias": 4.387, "path": -0.046, "highest": -4.27, "colour": -1.06, "figure difference": -1.47,
+    "figure": 0.454, "figure there": 0.365, "line": 0.367, "line top": -3.073, "away": -1.034,
+    "away down": -0.469, "away across": -1.545, "frame": 0.147, "walk": 0.203, "shy walk": 0.338,
 }  # fmt: skip
 """Logistic regression of "belongs to the object that holds the point" on the measures of
 `Scene.likeness`: `training/pointing.py` fits it."""
