@@ -6,7 +6,7 @@ Pictures at even places of the sorted folder are taken; the others measure (`ben
 For each thing of at least 2 % of a picture there are points: the deepest, and four well inside.
 Logistic regression, trained for the IoU of soft masks, learns which basins belong to the thing.
 Full batches and a seed: the same weights come out again. About two CPU-minutes. The weights belong
-to the network of `models/layers-1.onnx`: fit them anew when that changes.
+to the network of `models/layers-1.onnx.zst`: fit them anew when that changes.
 """
 
 from __future__ import annotations
