@@ -6,6 +6,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from .refine import spread
+
 Floats = NDArray[np.float32]
 Labels = NDArray[np.intp]
 Mask = NDArray[np.bool_]
@@ -54,13 +56,7 @@ def _watershed(boundary: Floats) -> NDArray[np.int32]:
     _, marks = cv2.connectedComponents(((smooth <= low + 1e-4) | (smooth < FLAT)).astype(np.uint8))
     levels = np.rint(np.clip(boundary, 0, 1) * 255).astype(np.uint8)
     flooded = cv2.watershed(cv2.merge([levels] * 3), marks)
-    ridge = (flooded <= 0).astype(np.uint8)
-    _, index = cv2.distanceTransformWithLabels(
-        ridge, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    of_pixel = np.ones(int(index.max()) + 1, np.int32)
-    of_pixel[index[ridge == 0]] = flooded[ridge == 0]
-    return np.asarray(of_pixel[index])
+    return np.asarray(spread(np.where(flooded <= 0, -1, flooded)), np.int32)
 
 
 def _merged(

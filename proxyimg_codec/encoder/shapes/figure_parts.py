@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from .basins import merged_basins
 from .masks import Region, description, nearness, unique_names
-from .refine import refined
+from .refine import refined, spread
 
 Floats = NDArray[np.float32]
 Labels = NDArray[np.intp]
@@ -113,7 +111,7 @@ def _parts(figure: Floats, most: int) -> Labels:
     if not large.any():  # slender things alone
         nearest = whole
     else:
-        nearest = np.where(seen > 0, _nearest(cores), 0)
+        nearest = np.where(seen > 0, spread(np.where(cores == 0, -1, cores)), 0)
         # A piece that touches no core is small, and left to the back.
         held = np.zeros(int(whole.max()) + 1, np.bool_)
         held[np.unique(whole[cores > 0])] = True
@@ -124,17 +122,6 @@ def _parts(figure: Floats, most: int) -> Labels:
     for number, i in enumerate(order[:most], 1):
         result[nearest == i] = number
     return result
-
-
-def _nearest(labels: NDArray[Any]) -> NDArray[np.int32]:
-    """Label of the nearest pixel that has one, for each pixel."""
-    missing = labels == 0
-    _, index = cv2.distanceTransformWithLabels(
-        missing.astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    of_pixel = np.zeros(int(index.max()) + 1, np.int32)
-    of_pixel[index[~missing]] = labels[~missing]
-    return np.asarray(of_pixel[index], np.int32)
 
 
 def _add_ground(labels: Labels, edges: Floats, inside: Mask, most: int) -> None:

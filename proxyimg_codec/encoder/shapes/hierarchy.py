@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .maps import Maps
+from .refine import spread
 
 Floats = NDArray[np.float32]
 Labels = NDArray[np.intp]
@@ -68,20 +69,17 @@ class Hierarchy:
         return np.asarray(self.of_basins(level)[self.basins])
 
 
-def hierarchy(
-    boundary: Floats, inside: NDArray[np.bool_] | None = None, look: Floats | None = None
-) -> Hierarchy:
+def hierarchy(boundary: Floats, inside: NDArray[np.bool_] | None = None) -> Hierarchy:
     """Divides a picture.
 
     Args:
         boundary: float32 [h, w] in 0..1, strength of boundaries.
         inside: bool [h, w], False for pixels whose boundaries count as strongest; None for none.
-        look: float32 [h, w, C]; differences of means of regions add to their boundary. None: none.
     """
     if inside is not None:
         boundary = np.where(inside, boundary, np.float32(1))
     basins = _basins(boundary)
-    return merged(basins, boundary, look=look)
+    return merged(basins, boundary)
 
 
 def _basins(boundary: Floats) -> Labels:
@@ -93,19 +91,8 @@ def _basins(boundary: Floats) -> Labels:
     padded = cv2.copyMakeBorder(markers, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
     ground = cv2.copyMakeBorder(levels, 1, 1, 1, 1, cv2.BORDER_REPLICATE)
     flooded = cv2.watershed(cv2.merge([ground] * 3), padded)[1:-1, 1:-1]
-    labels = _filled(np.asarray(flooded, np.int32))
+    labels = spread(np.where(flooded <= 0, -1, flooded))
     return np.unique(labels, return_inverse=True)[1].reshape(labels.shape)
-
-
-def _filled(labels: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Gives pixels without a positive label that of the nearest pixel with one."""
-    missing = labels <= 0
-    _, nearest = cv2.distanceTransformWithLabels(
-        missing.astype(np.uint8), cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    of_pixel = np.zeros(int(nearest.max()) + 1, np.int32)
-    of_pixel[nearest[~missing]] = labels[~missing]
-    return np.asarray(of_pixel[nearest])
 
 
 def borders(labels: Labels, boundary: Floats) -> tuple[Labels, Labels, Floats]:
@@ -142,7 +129,7 @@ def merged(
         basins: int [h, w], numbers of the regions from 0.
         boundary: float32 [h, w], strength of boundaries.
         kinds: int [N], kind of each region; those of different kinds never merge. None for one.
-        look: float32 [h, w, C], as for `hierarchy`.
+        look: float32 [h, w, C]; differences of means of regions add to their boundary. None: none.
     """
     pairs, lengths, sums = borders(basins, boundary)
     if kinds is not None:
