@@ -34,12 +34,12 @@ from benchmarks.composites import composites
 from proxyimg_codec import plugins
 from proxyimg_codec.bench.measure import psnr
 from proxyimg_codec.encoder.settings import Settings
+from proxyimg_codec.encoder.shapes.external_models.depth import ordered_by_depth
 from proxyimg_codec.encoder.shapes.external_models.segmenters import find_segmenter
 from proxyimg_codec.encoder.shapes.hierarchy import partitions
 from proxyimg_codec.encoder.shapes.labels import label_regions
-from proxyimg_codec.encoder.shapes.maps import Maps, find_maps
+from proxyimg_codec.encoder.shapes.maps import find_maps
 from proxyimg_codec.encoder.shapes.masks import Region, visible
-from proxyimg_codec.encoder.shapes.order import back_to_front
 from proxyimg_codec.io import raster
 
 Segmenter = Callable[..., list[Region]]
@@ -59,6 +59,7 @@ COST_SOURCE = "kodim23"
 COST_RUNS = 3
 
 SEGMENT = """
+from proxyimg_codec.encoder.shapes.external_models.depth import ordered_by_depth
 from proxyimg_codec.encoder.shapes.external_models.segmenters import find_segmenter
 from proxyimg_codec.io import raster
 rgb = raster.read({path!r}).pixels[..., :3]
@@ -241,15 +242,14 @@ def order(data: Path, name: str, count: int | None) -> Iterator[str]:
     with np.load(data / "depth" / "motorcycle_disp.npz") as file:
         disparity = np.asarray(file["arr_0"], np.float32)
     known = np.isfinite(disparity)
-    blank = np.zeros_like(disparity)
-    no_maps = Maps(blank, blank, np.dstack([blank, blank]))
+    nearness = np.where(known, disparity, disparity[known].min())
     right = pairs = 0
     rng = np.random.default_rng(0)
     for layers in range(2, 2 + (7 if count is None else count)):
         ends = np.quantile(disparity[known], np.linspace(0, 1, layers + 1))
         slices = np.clip(np.searchsorted(ends, disparity) - 1, 0, layers - 1)
-        masks = [known & (slices == k) for k in rng.permutation(layers)]
-        found = [int(slices[mask][0]) for mask in back_to_front(masks, no_maps, disparity)]
+        regions = [Region(str(k), known & (slices == k)) for k in rng.permutation(layers)]
+        found = [int(r.name) for r in ordered_by_depth(regions, nearness, opaque=False)]
         one, all_of_them = scores.inversions(found)
         right, pairs = right + one, pairs + all_of_them
     yield f"order, motorcycle, slices of its disparity: {right} of {pairs} pairs in order"

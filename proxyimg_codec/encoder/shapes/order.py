@@ -17,19 +17,16 @@ CERTAIN = 0.15
 """Mean ownership of a shared border, in -1..1, above which it decides who is in front."""
 
 
-def back_to_front(masks: Sequence[Mask], maps: Maps, depth: Floats | None = None) -> list[Mask]:
+def back_to_front(masks: Sequence[Mask], maps: Maps) -> list[Mask]:
     """Sorts masks by who is in front.
 
-    With a depth map, its medians decide. Else who owns the shared border decides where regions
-    touch; elsewhere what stands out, lies low and not along the frame of the picture is near.
+    Who owns the shared border decides where regions touch; elsewhere what stands out, lies low and
+    not along the frame of the picture is near.
 
     Args:
         masks: bool [H, W] each, disjoint, none empty.
         maps: Maps of the picture.
-        depth: float32 [H, W], larger is nearer; or None.
     """
-    if depth is not None:
-        return sorted(masks, key=lambda mask: float(np.median(depth[mask])))
     near = [nearness(mask, float(maps.figure[mask].mean())) for mask in masks]
     owns = ownership(masks, maps.owner)
     left, stack = list(range(len(masks))), list[int]()

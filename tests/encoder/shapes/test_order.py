@@ -2,7 +2,9 @@
 
 import numpy as np
 
+from proxyimg_codec.encoder.shapes.external_models.depth import ordered_by_depth
 from proxyimg_codec.encoder.shapes.maps import Maps
+from proxyimg_codec.encoder.shapes.masks import Region
 from proxyimg_codec.encoder.shapes.order import back_to_front, ownership
 
 
@@ -52,7 +54,8 @@ def test_depth_decides_where_there_is_one():
     front, behind = disc(50, 40, 22), disc(72, 40, 25)
     behind = behind & ~front
     depth = np.where(behind, 5.0, 1.0).astype(np.float32)
-    assert back_to_front([front, behind], maps_with(towards(front)), depth)[1] is behind
+    regions = [Region("front", front), Region("behind", behind)]
+    assert ordered_by_depth(regions, depth, opaque=False)[1].mask is behind
 
 
 def test_circles_of_overlaps_end():
