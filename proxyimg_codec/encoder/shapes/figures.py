@@ -93,9 +93,10 @@ def objects(scene: Scene, max_layers: int, support: Mask | None = None) -> Label
     worth = _worth(scene, figure, regions, held)
     most = max_layers - 1 if support is None else max_layers
     chosen = _chosen(scene, regions, worth, most, with_back=support is None)
-    of_basin = np.zeros(len(scene.area), np.intp) - (support is not None)
-    for number, region in enumerate(chosen, 1 if support is None else 0):
-        of_basin[region & (of_basin <= (0 if support is None else -1))] = number
+    first = 1 if support is None else 0
+    of_basin = np.full(len(scene.area), first - 1)
+    for number, region in enumerate(chosen, first):
+        of_basin[region] = number
     labels = of_basin[scene.labels]
     if support is not None:
         labels = spread(labels) if chosen else np.zeros_like(labels)

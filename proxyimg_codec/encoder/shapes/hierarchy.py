@@ -95,7 +95,7 @@ def _basins(boundary: Floats) -> Labels:
     return np.unique(labels, return_inverse=True)[1].reshape(labels.shape)
 
 
-def borders(labels: Labels, boundary: Floats) -> tuple[Labels, Labels, Floats]:
+def borders(labels: Labels, boundary: Floats) -> tuple[Labels, Labels, NDArray[np.float64]]:
     """Shared borders of regions.
 
     Args:
@@ -104,7 +104,7 @@ def borders(labels: Labels, boundary: Floats) -> tuple[Labels, Labels, Floats]:
 
     Returns:
         Pairs int [P, 2], the first smaller; length of each border in pixels int [P]; and the
-        strength summed along it, float32 [P].
+        strength summed along it, float64 [P].
     """
     keys, strengths = [], []
     count = int(labels.max()) + 1
@@ -116,7 +116,7 @@ def borders(labels: Labels, boundary: Floats) -> tuple[Labels, Labels, Floats]:
         strengths.append(np.maximum(boundary[one], boundary[two])[apart])
     pairs, which = np.unique(np.concatenate(keys), return_inverse=True)
     lengths = np.bincount(which, minlength=len(pairs))
-    sums = np.bincount(which, np.concatenate(strengths), len(pairs)).astype(np.float32)
+    sums = np.asarray(np.bincount(which, np.concatenate(strengths), len(pairs)), np.float64)
     return np.stack(np.divmod(pairs, count), 1), lengths, sums
 
 

@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from .hierarchy import borders
 from .maps import Maps
 
 Floats = NDArray[np.float64]
@@ -214,15 +215,10 @@ def _basins(boundary: NDArray[np.float32]) -> Labels:
 def _borders(labels: Labels, boundary: NDArray[np.float32]) -> tuple[Floats, Floats]:
     """Length of the border of two basins, and the mean boundary along it, float64 [N, N]."""
     count = int(labels.max()) + 1
-    length, total = np.zeros((2, count * count))
-    for one, other in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
-        border = labels[one] != labels[other]
-        pair = labels[one][border] * count + labels[other][border]
-        values = np.maximum(boundary[one], boundary[other])[border]
-        length += np.bincount(pair, minlength=count * count)
-        total += np.bincount(pair, values, count * count)
-    length, total = (v.reshape(count, count) for v in (length, total))
-    length, total = length + length.T, total + total.T
+    length, total = np.zeros((2, count, count))
+    pairs, lengths, sums = borders(labels, boundary)
+    for one, other in (pairs.T, pairs.T[::-1]):
+        length[one, other], total[one, other] = lengths, sums
     return length, np.divide(total, length, out=np.full_like(total, np.inf), where=length > 0)
 
 
