@@ -28,6 +28,9 @@ THING, STUFF = 128, 0.01
 """Labels below `THING` are things in pictures with labels of things; those that cover less than the
 share `STUFF` of the picture do not stand out."""
 
+LABELLED = ("coco", "things")
+"""Kinds of pictures with one map of labels, in which things are told from the rest."""
+
 MOST_SAMPLES = 6_000_000
 """Samples of a sprite above which it is left out, to save time."""
 
@@ -44,12 +47,14 @@ class Shot:
         figure: uint8 [H, W], 255 where it stands out.
         edge: uint8 [H, W], share of people who drew an edge there, 255 for all; None if unknown.
         front: uint8 [H, W], 2 on things, 1 on what lies behind them, 0 unknown; None likewise.
+        sure: bool [H, W], where `edge` counts; None = everywhere.
     """
 
     rgb: Bytes
     figure: Bytes
     edge: Bytes | None = None
     front: Bytes | None = None
+    sure: NDArray[np.bool_] | None = None
 
 
 def held_out(kind: str, position: int) -> bool:
@@ -58,11 +63,15 @@ def held_out(kind: str, position: int) -> bool:
 
 
 def sources(data: Path) -> list[tuple[str, Path]]:
-    """Kind and path of all pictures that may be trained on, without those kept apart."""
+    """Kind and path of all pictures that may be trained on, without those kept apart.
+
+    Those in ``layers/things`` have labels of some things; what has none is unknown.
+    """
     found = []
     for kind, folder, ending in (
         ("bsds", "layers/bsds", "*.jpg"),
         ("coco", "layers/coco", "*.jpg"),
+        ("things", "layers/things", "*.jpg"),
         ("photo", "train", "*"),
     ):
         paths = sorted((data / folder).glob(ending))
@@ -119,16 +128,18 @@ def teach(data: Path, model: Path, cache: Path, jobs: int) -> None:
 
 def shots(data: Path, cache: Path) -> dict[str, list[Shot]]:
     """Reads all pictures with their labels and the teacher's maps, by kind."""
-    found: dict[str, list[Shot]] = {"bsds": [], "coco": [], "photo": []}
+    found: dict[str, list[Shot]] = {}
     for kind, path in sources(data):
         rgb = _picture(path)
         labels = [_plane(p) for p in sorted(path.parent.glob(f"{path.stem}-*.png"))]
-        if kind == "coco":
+        if kind in LABELLED:
             labels = [_plane(path.with_suffix(".png"))]
         with np.load(cache / f"{kind}-{path.stem}.npz") as maps:
             for k, (y, x, h, w) in enumerate(boxes(rgb.shape, path.stem)):
                 at = np.s_[y : y + h, x : x + w]
-                found[kind].append(_shot(kind, rgb[at], [v[at] for v in labels], maps[str(k)]))
+                found.setdefault(kind, []).append(
+                    _shot(kind, rgb[at], [v[at] for v in labels], maps[str(k)])
+                )
     return found
 
 
@@ -143,7 +154,7 @@ def _shot(kind: str, rgb: Bytes, labels: list[Bytes], figure: Bytes) -> Shot:
         return Shot(rgb, figure)
     drawn_edges = [cv2.dilate(_edges(v), np.ones((2, 2), np.uint8)) for v in labels]
     edge = np.rint(np.mean(drawn_edges, 0) * 255).astype(np.uint8)
-    if kind != "coco":
+    if kind not in LABELLED:
         return Shot(rgb, figure, edge)
     label = labels[0]
     sizes = np.bincount(label.ravel(), minlength=256) / label.size
@@ -151,6 +162,10 @@ def _shot(kind: str, rgb: Bytes, labels: list[Bytes], figure: Bytes) -> Shot:
     # The teacher sees things without labels; those with labels stand out for certain.
     figure = np.where(thing, np.uint8(255), figure // 2)
     front = np.where(label == 0, 0, np.where(label < THING, 2, 1)).astype(np.uint8)
+    if kind == "things":
+        around = cv2.dilate((label > 0).astype(np.uint8), np.ones((9, 9), np.uint8)) > 0
+        front[around & (label == 0)] = 1
+        return Shot(rgb, figure, edge, front, around)
     return Shot(rgb, figure, edge, front)
 
 
@@ -242,7 +257,7 @@ def cut_outs(data: Path) -> list[Bytes]:
     """Things of labelled photographs as sprites, uint8 [H, W, 4], with softened edges."""
     found = []
     for kind, path in sources(data):
-        if kind != "coco":
+        if kind not in LABELLED:
             continue
         rgb, label = _picture(path), _plane(path.with_suffix(".png"))
         for k in range(1, THING):

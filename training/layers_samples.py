@@ -15,8 +15,8 @@ from .pictures import drawn
 
 Floats = NDArray[np.floating[Any]]
 
-SHARES = {"bsds": 0.35, "coco": 0.3, "photo": 0.25, "drawn": 0.1}
-"""How often a sample starts from each kind of picture."""
+SHARES = {"bsds": 0.3, "coco": 0.17, "things": 0.18, "photo": 0.25, "drawn": 0.1}
+"""How often a sample starts from each kind of picture, if there are any."""
 
 PASTED = 0.45
 """Share of photographs on which sprites are pasted."""
@@ -57,11 +57,14 @@ class Sampler:
         seed: int,
     ) -> None:
         self.pictures, self.pasted, self.seed = pictures, pasted, seed
+        self.kinds = [kind for kind in SHARES if kind in pictures or kind == "drawn"]
+        shares = np.array([SHARES[kind] for kind in self.kinds])
+        self.shares = shares / shares.sum()
 
     def sample(self, number: int, size: int) -> Sample:
         """Makes the sample of a number; the same for the same seed."""
         rng = np.random.default_rng([self.seed, number])
-        kind = rng.choice(list(SHARES), p=list(SHARES.values()))
+        kind = rng.choice(self.kinds, p=self.shares)
         if kind == "drawn":
             canvas = _Canvas.plain(_backdrop(rng, size))
         else:
@@ -130,6 +133,8 @@ def _framed(shot: Shot, size: int, rng: np.random.Generator) -> _Canvas:
     canvas = _Canvas.plain(cut(shot.rgb, soft).astype(np.float32) / 255)
     canvas.figure[:] = cut(shot.figure, soft) / np.float32(255)
     canvas.edge[:] = -1 if shot.edge is None else cut(shot.edge, soft) / np.float32(255)
+    if shot.sure is not None:
+        canvas.edge[cut(shot.sure.astype(np.uint8), cv2.INTER_NEAREST) == 0] = -1
     if shot.front is not None:
         front = cut(shot.front, cv2.INTER_NEAREST)
         unsure = cv2.dilate((front == 0).astype(np.uint8), np.ones((7, 7), np.uint8)) > 0
