@@ -1,12 +1,94 @@
-"""Edits of a layer as methods; each applies an operation of `operations`."""
+"""Edits as methods of pictures and of layers; those of layers are operations of `operations`."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Generic, TypeVar
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar
+
+if TYPE_CHECKING:
+    from ..model import Picture
 
 Pair = tuple[float, float]
 Edited = TypeVar("Edited")
+
+
+class EditableImage:
+    """Methods of a picture that return another one, after edits or before them."""
+
+    __slots__ = ()
+
+    @property
+    def picture(self) -> Picture:
+        """The picture as data."""
+        raise NotImplementedError  # only subclasses have one
+
+    def _with(self, picture: Picture) -> Self:
+        """Returns an image of another picture."""
+        raise NotImplementedError  # only subclasses can make one
+
+    def edited(self, *operations: Mapping[str, Any]) -> Self:
+        """Returns the picture after `operations`, applied in order; each can be undone.
+
+        Args:
+            operations: Operations as in an edit script, such as
+                ``{"op": "move", "layer": "cat", "by": [40, -10]}``.
+
+        Raises:
+            UsageError: An operation is unknown, or cannot be applied.
+
+        Examples:
+            >>> import proxyimg_codec as pxi
+            >>> image = pxi.open("photo.pxi")
+            >>> moved = image.edited({"op": "move", "layer": "disc", "by": [6, -2]})
+            >>> len(moved.history)
+            1
+        """
+        if not operations:
+            return self
+        from .script import apply
+
+        return self._with(apply(self.picture, operations))
+
+    def undone(self, steps: int = 1) -> Self:
+        """Returns the picture as it was before its last `steps` edits.
+
+        Raises:
+            UsageError: The history has fewer edits than that.
+
+        Examples:
+            >>> import proxyimg_codec as pxi
+            >>> image = pxi.open("photo.pxi")
+            >>> image.layers["disc"].hidden().undone() == image
+            True
+        """
+        from .history import undone
+
+        return self._with(undone(self.picture, steps))
+
+    def baked(self) -> Self:
+        """Returns the same picture without its history.
+
+        Pixels of a removed layer stay in the file if other layers show parts of the same planes;
+        `purged` takes them out.
+        """
+        return self._with(replace(self.picture, history=()))
+
+    def purged(self, effort: int = 2) -> Self:
+        """Returns the picture without its history, and without pixels that no layer can show.
+
+        What shows beside such pixels changes a little, see `edit.purge.purged`.
+
+        Args:
+            effort: How hard the encoder tries, 1..9.
+
+        Raises:
+            UsageError: The effort is out of range.
+            PxiError: The encoder, which this needs, is not installed.
+        """
+        from .purge import purged
+
+        return self._with(purged(self.picture, effort))
 
 
 class Editable(Generic[Edited]):
