@@ -172,7 +172,10 @@ class Editable(Generic[Edited]):
         return self._edited("point", path=path, point=point, by=[dx, dy])
 
     def removed(self) -> Edited:
-        """Removes the layer, so that what it hid shows."""
+        """Removes the layer, so that what it hid shows.
+
+        Its pixels stay in the file until the picture is purged; see `EditableImage.purged`.
+        """
         return self._edited("remove")
 
     def duplicated(self, name: str | None = None) -> Edited:

@@ -148,11 +148,12 @@ class _Erasure(Job):
     def planes(self) -> Planes:
         """Codes the present latents.
 
-        Other contexts may hold a latent for certainly 0 that is not, and was coded before. Then the
-        scales of its level are shifted until it is coded again, or no more is allowed.
+        Changed contexts may take a latent that did not change for certainly 0, though it is not.
+        Then the scales of its level are shifted until it is coded again, or no more is allowed.
         """
         found = [torch.round(y)[0].numpy().astype(np.int32) for y in self.latents]
         packed, shifts = self.old.packed, list(self._shifts())
+        fixed = [~m[0].numpy() for m in self.free]
         while True:
             made = coded.encoded(
                 Latents(tuple(found[:-1]), found[-1]), self.old.size, packed["step"], self.cells,
@@ -160,9 +161,9 @@ class _Erasure(Job):
             )  # fmt: skip
             lost = [
                 2 * k + group
-                for k, (y, z) in enumerate(zip(found, made.latents.levels, strict=False))
+                for k, (y, z, m) in enumerate(zip(found, made.latents.levels, fixed, strict=False))
                 for group, at in enumerate((slice(3), slice(3, 9)))
-                if (y[at] != z[at]).any() and shifts[2 * k + group] < LAST_SHIFT
+                if ((y != z) & m)[at].any() and shifts[2 * k + group] < LAST_SHIFT
             ]
             if not lost:
                 return made
