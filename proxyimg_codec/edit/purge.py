@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import PxiError, UsageError
+from ..limits import enough_memory
 from ..model import Layers, Picture
 from ..texture.implicit import ImplicitTexture
 from ..texture.planes import Planes
@@ -32,14 +33,14 @@ EFFORT = 2
 """Default of how hard the encoder tries with what lies beside the pixels that go."""
 
 
+@enough_memory("to purge the picture")
 def purged(picture: Picture, effort: int = EFFORT) -> Picture:
     """Takes what no layer shows out of the planes of a picture, and forgets its history.
-
-    Previews in EXIF and XMP go as well.
 
     In its place, planes continue smoothly what lies around. Latents that lie over it are encoded
     anew, at the same step. Beside it, samples change by about what quantization makes of them;
     the change fades with the distance. Planes of which everything shows stay as they are.
+    Previews in EXIF and XMP go as well.
 
     Args:
         picture: The picture.
@@ -49,6 +50,7 @@ def purged(picture: Picture, effort: int = EFFORT) -> Picture:
         UsageError: The effort is out of range.
         PxiError: The encoder, which this needs, is not installed.
         FormatError: The planes are corrupt.
+        LimitError: There is not enough memory.
     """
     if not 1 <= effort <= 9:
         raise UsageError(f"effort is {effort}, but must be 1..9")
