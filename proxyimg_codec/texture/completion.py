@@ -105,7 +105,6 @@ def completed(values: Values, known: Samples, copies: Copies) -> tuple[Values, S
         int32 [C, H, W] values, and bool [H, W], True for samples known now. Both may be the
         arrays that were given.
     """
-    _, height, width = values.shape
     flat = known.ravel()
     at, base = _bases(values, known, copies)
     inside = flat[at]
@@ -113,28 +112,29 @@ def completed(values: Values, known: Samples, copies: Copies) -> tuple[Values, S
     if not len(copied):
         return values, known
     out = values.reshape(len(values), -1).copy()
-    found = base[:, ~inside]
-    if len(rim):
-        beside, wanted = np.zeros((2, height * width), bool)
-        beside[rim], wanted[copied] = True, True
-        residual = np.zeros_like(out)
-        residual[:, rim] = out[:, rim] - base[:, inside]
-        shape = (height, width)
-        drift = diffused(
-            residual.reshape(values.shape), beside.reshape(shape), wanted.reshape(shape)
-        )
-        found += drift.reshape(len(out), -1)[:, copied]
-    out[:, copied] = np.clip(found, 0, FILL_ONE)
-    now = flat.copy()
-    now[copied] = True
+    now, beside = flat.copy(), np.zeros_like(flat)
+    now[copied], beside[rim] = True, True
+    for own, found in zip(out, base, strict=True):
+        drift = found[~inside]
+        if len(rim):
+            residual = np.zeros_like(own)
+            residual[rim] = own[rim] - found[inside]
+            drift += _spread(residual.reshape(1, *known.shape), beside, ~flat & now).ravel()[copied]
+        own[copied] = np.clip(drift, 0, FILL_ONE)
     return out.reshape(values.shape), now.reshape(known.shape)
 
 
-def _bases(values: Values, known: Samples, copies: Copies) -> tuple[NDArray[np.int64], Values]:
+def _spread(value: Values, known: Samples, wanted: Samples) -> Values:
+    """Values [1, H, W], spread by diffusion from those `known` [H * W] to those `wanted`."""
+    shape = value.shape[1:]
+    return diffused(value, known.reshape(shape), wanted.reshape(shape))
+
+
+def _bases(values: Values, known: Samples, copies: Copies) -> tuple[NDArray[np.int32], Values]:
     """Finds the samples that have a base, and the bases [PYR-49].
 
     Returns:
-        int64 [n] flat numbers of the samples, ascending, and int32 [C, n] bases.
+        int32 [n] flat numbers of the samples, ascending, and int32 [C, n] bases.
     """
     height, width = known.shape
     cells = np.pad(copies.sources, 1)
@@ -142,13 +142,13 @@ def _bases(values: Values, known: Samples, copies: Copies) -> tuple[NDArray[np.i
     # Where none of the four cells around a sample has a source, nothing is to be done.
     some = cells > 0
     near = some[:-1, :-1] | some[1:, :-1] | some[:-1, 1:] | some[1:, 1:]
-    places, bases = [np.zeros(0, np.int64)], [np.zeros((len(values), 0), np.int32)]
+    places, bases = [np.zeros(0, np.int32)], [np.zeros((len(values), 0), np.int32)]
     step = max(BAND // width, 1)
     for top in range(0, height, step):
         rows = down[0][top : top + step]
         y, x = np.nonzero(near[rows].take(across[0], 1))
         there, base = _base(values, known, copies, cells, (y + top, x), (down, across))
-        places.append(((y + top) * width + x)[there])
+        places.append(((y + top) * width + x)[there].astype(np.int32))
         bases.append(base)
     return np.concatenate(places), np.concatenate(bases, 1)
 
