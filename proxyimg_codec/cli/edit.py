@@ -134,9 +134,10 @@ def _check(args: argparse.Namespace, operations: Sequence[Values]) -> None:
 
 
 def _files_of(args: argparse.Namespace, operations: Sequence[Values]) -> list[str]:
-    """Files that edits read: scripts, and the sources of textures and outlines."""
+    """Files that edits read: scripts, masks, and the sources of textures and outlines."""
     edits = [edit for values in operations for edit in values.get("script", [values])]
-    sources = [edit.get("source") for edit in edits if isinstance(edit, Mapping)]
+    read = ("source", "mask")
+    sources = [edit.get(key) for edit in edits if isinstance(edit, Mapping) for key in read]
     scripts = [edit.words[0] for edit in args.edits if edit.flag == "--script"]
     return [*scripts, *(v for v in sources if isinstance(v, str) and "\0" not in v)]
 

@@ -203,6 +203,24 @@ def _recolour(layer: str, changes: str) -> Values:
     return values
 
 
+def _cut(text: str) -> Values:
+    layer, given, mask = text.partition("=")
+    if given:
+        if not mask:
+            raise ValueError
+        return {"op": "cut", "layer": key(layer), "mask": mask}
+    layer, *places = text.split("@")
+    if not places:
+        raise ValueError
+    points = [_floats(place.removeprefix("!"), 2) for place in places]
+    said = [place.startswith("!") for place in places]
+    values: Values = {"op": "cut", "layer": key(layer)}
+    for name, out in (("points", False), ("outside", True)):
+        some = [point for point, no in zip(points, said, strict=True) if no is out]
+        values |= {name: some} if some else {}
+    return values
+
+
 def _group(text: str) -> Values:
     name, given, layers = text.partition("=")
     if not given:
@@ -249,6 +267,9 @@ FLAGS = (
     Flag("--outlines", _outlines, ["FILE.svg"], "take boundaries from an SVG, by layer name"),
     Flag("--remove", _named("remove"), ["NAME"], "take away: what it hid shows"),
     Flag("--duplicate", _assigned("duplicate", "name"), ["NAME[=COPY]"], "copy"),
+    Flag("--cut", _cut, ["NAME=MASK|NAME@X,Y"],
+        "make a layer out of a part: what a mask holds, or what is found at points, "
+        "more with @X,Y, outside of it @!X,Y"),
     Flag("--rename", _assigned("rename", "name"), ["NAME=NEW"], "give another name"),
     Flag("--order", _order, ["NAME", "PLACE"],
         "front, back, forward, backward, or a position from the back"),

@@ -93,6 +93,25 @@ class Editable(Generic[Edited]):
         """Removes the layer, so that what it hid shows."""
         return self._edited("remove")
 
+    def cut(
+        self,
+        mask: str | None = None,
+        *,
+        points: Sequence[Pair] | None = None,
+        outside: Sequence[Pair] | None = None,
+        name: str | None = None,
+    ) -> Edited:
+        """Makes a new layer, just in front, out of a part of the layer; nothing is encoded anew.
+
+        Args:
+            mask: Name of a file with a mask of the canvas.
+            points: Instead of a mask, canvas points inside of what is to be found.
+            outside: Canvas points outside of it.
+            name: Name of the new layer; by default that of the mask file.
+        """
+        given = {"mask": mask, "points": points, "outside": outside, "name": name}
+        return self._edited("cut", **given)
+
     def duplicated(self, name: str | None = None) -> Edited:
         """Puts a copy in front of the layer, which shares its texture."""
         return self._edited("duplicate", name=name)

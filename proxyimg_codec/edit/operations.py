@@ -47,6 +47,7 @@ KINDS: dict[str, dict[str, Any]] = {
     "integer": {"type": "integer"},
     "place": {"type": ["integer", "string"]},
     "pair": _numbers(2),
+    "pairs": {"type": "array", "items": _numbers(2), "minItems": 1, "maxItems": HANDLES_MAX},
     "matrix": _numbers(6),
     "colours": _numbers(12),
     "handles": {
