@@ -221,6 +221,10 @@ def _cut(text: str) -> Values:
     return values
 
 
+def _merge(layer: str, other: str) -> Values:
+    return {"op": "merge", "layer": key(layer), "other": key(other)}
+
+
 def _group(text: str) -> Values:
     name, given, layers = text.partition("=")
     if not given:
@@ -270,6 +274,7 @@ FLAGS = (
     Flag("--cut", _cut, ["NAME=MASK|NAME@X,Y"],
         "make a layer out of a part: what a mask holds, or what is found at points, "
         "more with @X,Y, outside of it @!X,Y"),
+    Flag("--merge", _merge, ["NAME", "OTHER"], "make one layer of two that show the same planes"),
     Flag("--rename", _assigned("rename", "name"), ["NAME=NEW"], "give another name"),
     Flag("--order", _order, ["NAME", "PLACE"],
         "front, back, forward, backward, or a position from the back"),

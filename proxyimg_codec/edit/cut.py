@@ -21,7 +21,7 @@ from ..geometry.pose import OPACITY_MAX
 from ..model import Layer, Picture
 from ..render.pixels import render
 from ..texture.implicit import Box, ImplicitTexture
-from ..texture.occlusion import Occlusion
+from ..texture.occlusion import REACH, Occlusion
 from ..texture.pyramid import PyramidTexture, Texture
 from .operations import changed, checked_name, free_name, layer_named, operation
 from .regions import Bools, Ints, at_rest, coverage, eroded, extent, traced, within
@@ -223,9 +223,12 @@ def _shared(layer: Layer, boundary: Boundary) -> tuple[Part, Texture]:
     old = texture.cuts
     if old is None:
         old = Occlusion(None, (), layer.box, within(texture.mask, texture.cell, texture.part))
+    near = coverage(boundary, box) > 0
+    for _ in range(REACH):
+        near = ~eroded(~near, True)
     own = Occlusion(
         boundary,
-        tuple(front for front in old.fronts if _meets(front.bounds(), box)),
+        tuple(front for front in old.fronts if (coverage(front, box)[near] > 0).any()),
         box,
         within(mask, cell, part),
     )
@@ -233,12 +236,6 @@ def _shared(layer: Layer, boundary: Boundary) -> tuple[Part, Texture]:
         (box, PyramidTexture(texture.planes, texture.alpha, part, cell, mask, own)),
         replace(texture, cuts=replace(old, fronts=(*old.fronts, boundary))),
     )
-
-
-def _meets(bounds: tuple[int, int, int, int], box: Box) -> bool:
-    """Whether bounds x0, y0, x1, y1 and a box have a pixel in common."""
-    x, y, width, height = box
-    return bounds[0] < x + width and x < bounds[2] and bounds[1] < y + height and y < bounds[3]
 
 
 def _codes(texture: ImplicitTexture, box: Box, boundary: Boundary) -> tuple[Part, Texture]:

@@ -112,6 +112,14 @@ class Editable(Generic[Edited]):
         given = {"mask": mask, "points": points, "outside": outside, "name": name}
         return self._edited("cut", **given)
 
+    def merged(self, other: str | int) -> Edited:
+        """Makes one layer of this one and another that shows the same planes; nothing is encoded.
+
+        Args:
+            other: Name or position of the other layer.
+        """
+        return self._edited("merge", other=other)
+
     def duplicated(self, name: str | None = None) -> Edited:
         """Puts a copy in front of the layer, which shares its texture."""
         return self._edited("duplicate", name=name)
