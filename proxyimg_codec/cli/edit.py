@@ -43,6 +43,13 @@ def arguments() -> argparse.ArgumentParser:
                    "standard input; .pxi file, which may be IN with --force, - for standard "
                    "output, or another picture file, to draw it as pxi-decode does")  # fmt: skip
     add_edits(p)
+    p.add_argument(
+        "-e",
+        "--effort",
+        type=int,
+        metavar="1-9",
+        help="how long to optimize what is encoded: pictures as textures; default 2",
+    )
     p.add_argument("--bake", action="store_true", help="forget the history of edits")
     p.add_argument("--list", action="store_true", help="print layers, groups and history")
     add_limits(p)
@@ -70,6 +77,9 @@ def edit_file(args: argparse.Namespace) -> None:
     args.input, args.output = in_and_out(args.files)
     operations = [edit.values() for edit in args.edits]
     _check(args, operations)
+    if args.effort is not None:
+        operations = [v | {"effort": args.effort} if v.get("op") == "texture" else v
+                      for v in operations]  # fmt: skip
 
     from ..codec.read import from_file
     from ..codec.write import to_bytes
@@ -122,6 +132,8 @@ def _check(args: argparse.Namespace, operations: Sequence[Values]) -> None:
         raise UsageError("OUT is missing; --list alone needs none")
     if args.output == "-" and (args.list or args.json):
         raise UsageError("a list or report and a picture cannot both go to standard output")
+    if args.effort is not None and not 1 <= args.effort <= 9:
+        raise UsageError(f"--effort {args.effort}: must be 1..9")
     if args.output is None:
         return
     drawn = _drawn(args)

@@ -18,6 +18,7 @@ from ..geometry.pose import COLOUR_BITS, COLOUR_MAX, NODE_BITS, NODE_MAX, OPACIT
 from ..geometry.warp import WEIGHT_BITS, barycentric
 from ..model import Layer, Picture
 from ..texture.network import Network
+from ..texture.occlusion import Occlusion
 from ..texture.pyramid import PyramidTexture, Texture
 from .operations import changed, layer_named, operation, shown_together, substituted
 from .transforms import TARGET, meshed, sampled
@@ -128,15 +129,20 @@ def _hue(degrees: float) -> Reals:
 @operation("texture", layer="layer: the layer that changes, by name or position",
            source="layer: a layer of this picture, or the name of a .pxi or picture file",
            from_layer="foreign?: a layer of that .pxi file; its front one by default",
-           fit="fit?: box to box, or by the shape of the outlines")  # fmt: skip
+           fit="fit?: box to box, or by the shape of the outlines",
+           effort="integer?: 1 to 9, how hard a picture file is encoded; 2 by default")  # fmt: skip
 def texture(
     picture: Picture,
     layer: str | int,
     source: str,
     from_layer: str | int | None = None,
     fit: str = "box",
+    effort: int = 2,
 ) -> Picture:
     """Gives a layer the texture of another layer, of another file's layer, or of a picture.
+
+    Where boundaries cut the view of the source, the texture is filled from what lies clear of them:
+    mixed samples would be an outline of the source in the middle of the layer.
 
     Args:
         picture: The picture.
@@ -144,6 +150,7 @@ def texture(
         source: Name of a layer of the picture, or of a `.pxi` file or picture file.
         from_layer: Name or position of a layer of that `.pxi` file; its front layer by default.
         fit: ``box`` stretches the texture from box to box; ``shape`` maps outline to outline.
+        effort: How hard the encoder tries with a picture file, 1..9; other sources need none.
 
     Raises:
         UsageError: The source does not exist, or does not fit.
@@ -157,8 +164,10 @@ def texture(
         home, origin = picture, layer_named(picture, source)
         shown = origin.texture
     else:
-        home, origin = _loaded(source, from_layer)
+        home, origin = _loaded(source, from_layer, effort)
         shown = _brought(picture, home, origin, networks)
+    if isinstance(shown, PyramidTexture) and shown.cuts is not None and origin is not target:
+        shown = shown.masked(shown.cuts.everything)
     if origin.sampling and fit == "shape":
         raise UsageError(
             f"texture: layer {origin.name!r} has its features at its own nodes, which do not fit "
@@ -206,8 +215,10 @@ def _brought(picture: Picture, home: Picture, origin: Layer, networks: list[Netw
     return replace(texture, network=number)
 
 
-def _loaded(source: str, name: str | int | None) -> tuple[Picture, Layer]:
+def _loaded(source: str, name: str | int | None, effort: int) -> tuple[Picture, Layer]:
     """Reads a `.pxi` file and chooses a layer of it, or encodes a picture file as one layer.
+
+    A boundary that the picture gets, since it is clear outside, cuts the texture of the layer.
 
     Returns:
         The picture and the layer.
@@ -240,8 +251,12 @@ def _loaded(source: str, name: str | int | None) -> tuple[Picture, Layer]:
         raise PxiError(
             f"the texture of a picture needs {error.name}: pip install 'proxyimg-codec[encode]'"
         ) from None
-    made = encode(pixels, max_layers=1)
-    return made, made.layers[0]
+    made = encode(pixels, max_layers=1, effort=effort)
+    layer = made.layers[0]
+    if isinstance(layer.texture, PyramidTexture) and layer.texture.alpha is None:
+        cuts = Occlusion.of([0] if layer.boundary else [], 0, [layer.boundary], layer.box)
+        layer = replace(layer, texture=replace(layer.texture, cuts=cuts))
+    return made, layer
 
 
 Shapes = tuple[Layer, tuple[int, int], Layer, tuple[int, int]]

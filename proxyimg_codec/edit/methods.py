@@ -183,7 +183,11 @@ class Editable(Generic[Edited]):
         return self._edited("recolour", **values, matrix=None if matrix is None else list(matrix))
 
     def textured(
-        self, source: str | int, layer: str | int | None = None, fit: str = "box"
+        self,
+        source: str | int,
+        layer: str | int | None = None,
+        fit: str = "box",
+        effort: int | None = None,
     ) -> Edited:
         """Gives the layer another texture; its shape stays.
 
@@ -192,8 +196,9 @@ class Editable(Generic[Edited]):
                 picture file.
             layer: Name or position of a layer of that `.pxi` file; its front layer by default.
             fit: ``box`` stretches the texture from box to box; ``shape`` maps outline to outline.
+            effort: How hard the encoder tries with a picture file, 1..9; by default 2.
         """
-        return self._edited("texture", source=source, from_layer=layer, fit=fit)
+        return self._edited("texture", source=source, from_layer=layer, fit=fit, effort=effort)
 
     def with_parent(self, parent: str | int | None) -> Edited:
         """Lets the layer follow another layer, by name or position, or a group; None for none."""

@@ -83,7 +83,7 @@ KEPT = {
     "order": [[1, 2], [1], "mask"],
     "remove": ["mask", "mask"],
     "point": ["mask", "mask", "mask"],
-    "texture": [[1, 2], [1, 2], 1],
+    "texture": [[1, 2], [1, 2], "mask"],
 }
 """What is left of the cuts after an edit of the disc."""
 
@@ -240,25 +240,23 @@ def test_orders_that_leave_all_fronts_in_front(cut):
     same_when_loaded(bare)
 
 
-def test_copies_in_front_of_the_back_are_masked_with_it(cut):
-    """Who shows a view first has to have the box that it was cut in."""
+def test_textures_are_lent_without_rims(cut):
+    """The lender keeps its own."""
     lent = cut.layers["bar"].textured("disc")
-    assert kinds(lent) == [[1, 2], "mask", 1]
-    own = cut.layers["disc"]
-    assert lent.layers["bar"].texture is lent.layers["disc"].texture
-    expected = own.texture.masked(ALL_IN_PLACE).mask
-    np.testing.assert_array_equal(lent.layers["disc"].texture.mask, expected)
+    assert kinds(lent) == [[1, 2], "mask", [2]]
+    np.testing.assert_array_equal(lent.layers["bar"].texture.mask, alone(cut.layers["disc"]).mask)
     same_when_loaded(lent)
     back = cut.layers["disc"].textured("back")
-    assert kinds(back) == [[1, 2], [1, 2], 0]
+    assert kinds(back) == [[1, 2], [1, 2], "mask"]
     same_when_loaded(back)
+    assert cut.layers["disc"].textured("disc").layers["disc"].texture.cuts is not None
 
 
 def test_copies_that_lie_elsewhere(made_up_planes):
     whole, shape = (0, 0, *SIZE), rectangle(5, 5, 50, 40)
     image = stack([(8, 6, 30, 25), whole, whole], [shape, None, shape], [[], [2], []])
     lent = image.layers["0"].textured("1")
-    assert kinds(lent) == ["mask", 0, []]
+    assert kinds(lent) == ["mask", [2], []]
     same_when_loaded(lent)
     bare = image.layers["2"].textured("1").layers["1"].removed()
     assert kinds(bare) == [[], "mask"]  # it is not in front of itself
@@ -292,9 +290,6 @@ def test_textures_for_other_files(cut, made_up_planes, tmp_path, fit, name):
         changed = image.layers["disc"].textured(str(tmp_path / "cut.pxi"), name, fit)
         same_when_loaded(changed)
         taken = changed.layers["disc"].texture
-        if name == "disc" and image.networks == ():  # box and outline are the same
-            assert kinds(changed) == [[1, 2], [1, 2], [2]]
-            continue
         assert kinds(changed)[2] == "mask"
         np.testing.assert_array_equal(taken.mask, alone(cut.layers[name]).mask)
 
