@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from . import model
 from .codec import read
 from .container.chunks import Chunk
-from .edit.methods import Editable
+from .edit.methods import Editable, Insertable
 from .errors import UnsupportedError
 from .handles import LayerHandle, MadeOnce, PictureHandle
 from .io.files import write_atomically
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from .encoder.shapes.mask_arrays import Masks
 
 
-class Image(PictureHandle):
+class Image(PictureHandle, Insertable["Image"]):
     """A `.pxi` picture in memory. Images are equal if their files are, and are pickled as files.
 
     Args:

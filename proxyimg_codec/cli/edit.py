@@ -29,6 +29,9 @@ from .places import (
 if TYPE_CHECKING:
     from ..model import Picture
 
+ENCODED = ("texture", "insert")
+"""Operations that may encode a picture file."""
+
 
 def arguments() -> argparse.ArgumentParser:
     """Parser of the command line; its result has a list `edits` in the order of the flags."""
@@ -48,7 +51,7 @@ def arguments() -> argparse.ArgumentParser:
         "--effort",
         type=int,
         metavar="1-9",
-        help="how long to optimize what is encoded: pictures as textures; default 2",
+        help="how long to optimize pictures that become textures or layers; default 2",
     )
     p.add_argument("--bake", action="store_true", help="forget the history of edits")
     p.add_argument("--list", action="store_true", help="print layers, groups and history")
@@ -78,7 +81,7 @@ def edit_file(args: argparse.Namespace) -> None:
     operations = [edit.values() for edit in args.edits]
     _check(args, operations)
     if args.effort is not None:
-        operations = [v | {"effort": args.effort} if v.get("op") == "texture" else v
+        operations = [v | {"effort": args.effort} if v.get("op") in ENCODED else v
                       for v in operations]  # fmt: skip
 
     from ..codec.read import from_file

@@ -181,15 +181,37 @@ def _order(layer: str, place: str) -> Values:
 
 
 def _texture(text: str) -> Values:
-    layer, given, source = text.partition("=")
+    target, given, source = text.partition("=")
     if not given or not source:
         raise ValueError
-    values: Values = {"op": "texture", "layer": key(layer)}
+    values: Values = {"op": "texture", "layer": key(target)}
     if source.endswith("@shape"):
         source, values["fit"] = source.removesuffix("@shape"), "shape"
-    if parts := re.fullmatch(r"(.+?\.pxi):(.+)", source, re.IGNORECASE):
-        return {**values, "source": parts[1], "from_layer": key(parts[2])}
-    return {**values, "source": key(source)}
+    file, layer = _foreign(source)
+    return {**values, "source": file or key(source), **layer}
+
+
+def _foreign(source: str) -> tuple[str, Values]:
+    """Splits FILE.pxi:LAYER into the file, or nothing, and the parameter `from_layer`."""
+    parts = re.fullmatch(r"(.+?\.pxi):(.+)", source, re.IGNORECASE)
+    return (parts[1], {"from_layer": key(parts[2])}) if parts else ("", {})
+
+
+def _insert(text: str) -> Values:
+    values: Values = {"op": "insert"}
+    beside, given, source = text.partition("=")
+    if given:
+        side = "under" if beside.startswith("under:") else "over"
+        values[side] = key(beside.removeprefix("under:"))
+    else:
+        source = text
+    start, at, place = source.rpartition("@")
+    if at and re.fullmatch(r"[-+.,\deE]+", place):
+        source, values["at"] = start, _floats(place, 2)
+    if not source:
+        raise ValueError
+    file, layer = _foreign(source)
+    return {**values, "source": file or source, **layer}
 
 
 def _recolour(layer: str, changes: str) -> Values:
@@ -275,6 +297,9 @@ FLAGS = (
         "make a layer out of a part: what a mask holds, or what is found at points, "
         "more with @X,Y, outside of it @!X,Y"),
     Flag("--merge", _merge, ["NAME", "OTHER"], "make one layer of two that show the same planes"),
+    Flag("--insert", _insert, ["[NAME=]SOURCE[@X,Y]"],
+        "a layer of another file (FILE.pxi:LAYER) or a cut-out picture, in front of all or NAME, "
+        "or behind under:NAME; its centre at X,Y"),
     Flag("--rename", _assigned("rename", "name"), ["NAME=NEW"], "give another name"),
     Flag("--order", _order, ["NAME", "PLACE"],
         "front, back, forward, backward, or a position from the back"),

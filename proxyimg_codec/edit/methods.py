@@ -1,4 +1,4 @@
-"""Edits of a layer as methods; each applies an operation of `operations`."""
+"""Edits of a layer, or of a picture, as methods; each applies an operation of `operations`."""
 
 from __future__ import annotations
 
@@ -203,3 +203,40 @@ class Editable(Generic[Edited]):
     def with_parent(self, parent: str | int | None) -> Edited:
         """Lets the layer follow another layer, by name or position, or a group; None for none."""
         return self._edited("parent", to="" if parent is None else parent)
+
+
+class Insertable(Generic[Edited]):
+    """Methods of a picture that return a new image with one more layer."""
+
+    __slots__ = ()
+
+    def edited(self, *operations: Mapping[str, Any]) -> Edited:
+        """Image after operations."""
+        raise NotImplementedError  # only subclasses know the picture
+
+    def inserted(
+        self,
+        source: str,
+        layer: str | int | None = None,
+        *,
+        at: Pair | None = None,
+        over: str | int | None = None,
+        under: str | int | None = None,
+        name: str | None = None,
+        effort: int | None = None,
+    ) -> Edited:
+        """Inserts a layer of another `.pxi` file, which is not encoded anew, or a picture file.
+
+        Args:
+            source: Name of the file.
+            layer: Name or position of a layer of a `.pxi` file; its front layer by default.
+            at: Canvas point for its centre; by default that in its own file if both pictures have
+                the same size, otherwise the middle of the canvas.
+            over: Name or position of the layer that it lies just in front of.
+            under: Name or position of the layer that it lies just behind.
+            name: Name of the new layer.
+            effort: How hard the encoder tries with a picture file, 1..9; by default 2.
+        """
+        given = {"source": source, "from_layer": layer, "at": at, "over": over, "under": under,
+                 "name": name, "effort": effort}  # fmt: skip
+        return self.edited({"op": "insert", **{k: v for k, v in given.items() if v is not None}})

@@ -75,6 +75,8 @@ BAD = [
     ({"op": "cut", "layer": "disc", "mask": "m.png", "outside": [[1, 2]]}, "either a mask"),
     ({"op": "merge", "layer": "disc", "other": "disc"}, "twice"),
     ({"op": "merge", "layer": "disc", "other": "bar"}, "textures of their own"),
+    ({"op": "insert", "source": "nothing.png"}, "no file"),
+    ({"op": "insert", "source": "nothing.png", "over": "cat"}, "no layer 'cat'"),
     ({"op": "rename", "layer": "disc", "name": "bar"}, "already"),
     ({"op": "rename", "layer": "disc", "name": ""}, "1..200"),
     ({"op": "rename", "layer": "disc", "name": "a\nb"}, "printable"),
