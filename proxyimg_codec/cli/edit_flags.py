@@ -85,6 +85,23 @@ def add_edits(p: argparse.ArgumentParser) -> None:
     group = p.add_argument_group("edits")
     for flag in FLAGS:
         flag.add(group)
+    group.add_argument(
+        "--follow",
+        action=_Follow,
+        nargs=0,
+        default=argparse.SUPPRESS,
+        help="after --point: its inside goes along, the rest of the outline stays",
+    )
+
+
+class _Follow(argparse.Action):
+    """Adds `follow` to the `--point` before it."""
+
+    def __call__(self, parser: Any, space: Any, values: Any, option: Any = None) -> None:
+        if not space.edits or space.edits[-1].flag != "--point":
+            parser.error("--follow belongs right after a --point and its words")
+        *before, last = space.edits
+        space.edits = [*before, last._replace(parse=_point_followed)]
 
 
 def guarded(words: Sequence[str]) -> list[str]:
@@ -151,6 +168,10 @@ def _point(layer: str, which: str, by: str) -> Values:
     return {
         "op": "point", "layer": key(layer), "path": path, "point": point, "by": _floats(by, 2)
     }  # fmt: skip
+
+
+def _point_followed(layer: str, which: str, by: str) -> Values:
+    return {**_point(layer, which, by), "follow": True}
 
 
 def _named(op: str) -> Callable[[str], Values]:

@@ -78,7 +78,9 @@ class Editable(Generic[Edited]):
         """
         return self._edited("drag", handles=[[*p, *v] for p, v in handles.items()])
 
-    def with_point(self, path: int, point: int, dx: float, dy: float) -> Edited:
+    def with_point(
+        self, path: int, point: int, dx: float, dy: float, *, follow: bool = False
+    ) -> Edited:
         """Moves one control point of the boundary; texture appears or disappears there.
 
         Args:
@@ -86,8 +88,11 @@ class Editable(Generic[Edited]):
             point: Number of the control point in the path, from 0.
             dx: Distance to the right.
             dy: Distance down.
+            follow: Whether the proxy nodes, and so the texture, go along instead; the rest of the
+                outline stays.
         """
-        return self._edited("point", path=path, point=point, by=[dx, dy])
+        by = [dx, dy]
+        return self._edited("point", path=path, point=point, by=by, follow=follow or None)
 
     def removed(self) -> Edited:
         """Removes the layer, so that what it hid shows."""

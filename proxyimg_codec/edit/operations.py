@@ -57,6 +57,7 @@ KINDS: dict[str, dict[str, Any]] = {
         "maxItems": HANDLES_MAX,
     },
     "text": {"type": "string", "pattern": r"^[^\0]*$"},
+    "flag": {"type": "boolean"},
     "axis": {"enum": ["horizontal", "vertical"]},
     "fit": {"enum": ["box", "shape"]},
     "colour": {"type": "string", "pattern": "^#[0-9a-fA-F]{6}$"},
