@@ -23,7 +23,7 @@ import numpy as np
 import zstandard
 
 from proxyimg_codec import from_bytes
-from proxyimg_codec.container import file, undo
+from proxyimg_codec.container import file, texr, undo
 from proxyimg_codec.container.chunks import Chunk, write
 from proxyimg_codec.container.content import Container
 from proxyimg_codec.entropy import arrays
@@ -111,7 +111,7 @@ def plan(columns: int, rows: int, levels: int = 3, data: bytes = b"") -> Values:
 def view(columns: int, rows: int, planes: int = 0, **values: Any) -> Values:
     """Fields of a TEXR that shows planes."""
     plain = {"alpha": 0, "part": [0, 0, columns, rows], "cell": 0, "mask": b"", "cuts": []}
-    return {"coder": 2, "planes": planes, **plain, **values}
+    return {"coder": 2, "planes": planes, **plain, **texr.ABSENT, **values}
 
 
 def made(
@@ -452,6 +452,37 @@ def masks() -> bytes:
         [layer(k) for k in range(count)], [view(2, 16_000, mask=coded)] * count,
         planes=(plan(2, 16_000, 1),),
     )  # fmt: skip
+
+
+@bomb
+def sources() -> bytes:
+    """References of as many cells as are allowed, each of one sample that shows nowhere."""
+    side, masked = 2048, {"cell": 6, "mask": lonely(32, 32)}
+    copied = view(side, side, offsets=[1, 1] * 16, sources=_ones(2, side, side), **masked)
+    return made([layer()], [copied], planes=(plan(side, side),))
+
+
+@bomb
+def copies() -> bytes:
+    """View of as many samples as are allowed, most of them copied; another raster behind it."""
+    width, height = 4096, 2048
+    masked = {"cell": 6, "mask": lonely(32, 64), "behind": 2}
+    copied = view(width, height, grain=6, offsets=[64, 0], sources=_ones(1, 32, 64), **masked)
+    behind = plan(width, height) | {"cell": 7, "support": _halves(16, 32)}
+    return made([layer()], [copied], planes=(plan(width, height), behind))
+
+
+def _ones(channels: int, rows: int, columns: int) -> bytes:
+    """Coded array of sources that are all 1."""
+    values = np.zeros((channels, rows, columns), np.int8)
+    values[0] = 1
+    return arrays.encode(values, 4 if channels == 2 else 1, np.ones((rows, columns), bool))
+
+
+def _halves(rows: int, columns: int) -> bytes:
+    """Coded array of bits, of which every other is set."""
+    values = np.indices((rows, columns)).sum(0)[None] % 2
+    return arrays.encode(values, 1, np.ones((rows, columns), bool))
 
 
 @bomb

@@ -120,7 +120,7 @@ class PictureHandle(Handle):
         return self._picture.damage
 
     @property
-    def planes(self) -> list[Planes]:
+    def planes(self) -> tuple[Planes, ...]:
         """Planes of all rasters that pyramid textures show, in the order of their first use."""
         return self._picture.planes
 

@@ -135,6 +135,10 @@ class Picture:
         timeline: Timeline that the tracks of layers refer to; None if nothing moves.
         history: Edits that led to this state, oldest first, each with the state before it.
         damage: Descriptions of the damage that was tolerated when the file was read.
+        planes: Planes of all rasters that pyramid textures show, in the order of the file. Those
+            that are given keep their order; of these, the ones that no texture shows are dropped,
+            and others are appended in the order of their first use. So an edit numbers no planes
+            anew but those behind some that it drops.
     """
 
     width: int
@@ -151,8 +155,13 @@ class Picture:
     timeline: Timeline | None = None
     history: tuple[Step, ...] = ()
     damage: tuple[str, ...] = ()
+    planes: tuple[Planes, ...] = ()
 
     def __post_init__(self) -> None:
+        views = (v.texture for v in self.layers if isinstance(v.texture, PyramidTexture))
+        shown = dict.fromkeys(source for view in views for source in view.sources)
+        known = dict.fromkeys(p for p in self.planes if p in shown)
+        object.__setattr__(self, "planes", tuple(known | shown))
         for name in ("blocks", "groups", "info"):
             values = getattr(self, name)
             if values is not None:
@@ -174,12 +183,6 @@ class Picture:
     def size(self) -> tuple[int, int]:
         """Width and height of the canvas in pixels."""
         return self.width, self.height
-
-    @property
-    def planes(self) -> list[Planes]:
-        """Planes of all rasters that pyramid textures show, in the order of their first use."""
-        views = (v.texture for v in self.layers if isinstance(v.texture, PyramidTexture))
-        return list(dict.fromkeys(source for view in views for source in view.sources))
 
     def network_of(self, layer: Layer) -> Network | None:
         """Network that decodes the texture of `layer`; None for pyramid textures."""

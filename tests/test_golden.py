@@ -35,6 +35,9 @@ def test_old_files_decode_as_ever(file):
         "0.3/moves-loop",
         "0.9/edited",
         "0.9/moves-loop",
+        "0.10/edited",
+        "0.10/moves-loop",
+        "0.10/cuts-moved",
     ],
 )
 def test_old_files_are_saved_as_new_ones_with_the_same_pixels(name):
@@ -52,6 +55,7 @@ def test_old_files_are_saved_as_new_ones_with_the_same_pixels(name):
         ("0.2/edited", 6, "0.1/layers"),
         ("0.3/edited", 3, "0.3/start"),
         ("0.9/edited", 2, "0.9/start"),
+        ("0.10/edited", 2, "0.10/start"),
     ],
 )
 def test_old_histories_lead_back(edited, edits, start):

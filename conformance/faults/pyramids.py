@@ -13,10 +13,12 @@ from proxyimg_codec.geometry.pose import Pose
 from proxyimg_codec.native import kernel
 from proxyimg_codec.render import compose
 from proxyimg_codec.texture import (
+    completion,
     context,
     grid,
     latents,
     occlusion,
+    planes,
     pyramid,
     registered_model,
     synthesis,
@@ -171,11 +173,48 @@ def _only_where(self: Pose, other: Pose) -> bool:
     return (self.matrix, self.shift) == (other.matrix, other.shift)
 
 
+def _without(*fields: str) -> Any:
+    """Function that unpacks a view without some of its fields."""
+    absent: dict[str, Any] = dict.fromkeys(fields)
+    return lambda *args: replace(unpack_of(*args), **absent)
+
+
+def _down_first(*args: Any) -> PyramidTexture:
+    found = unpack_of(*args)
+    copies = found.copies
+    turned = copies and replace(copies, offsets=copies.offsets[:, ::-1])
+    return replace(found, copies=turned)
+
+
+def _nearest_cell(count: int, grain: int) -> Any:
+    number, weight = weights_of(count, grain)
+    return number, np.where(weight * 2 >= 2 << grain, 2 << grain, 0).astype(np.int32)
+
+
+def _low_sources(self: Any, where: Any) -> Any:
+    found = copies_of(self, where)
+    return found and replace(found, sources=found.sources & np.uint8(15))
+
+
+def _over_trusted(self: PyramidTexture, trusted: Any) -> Any:
+    return known_of(self, trusted if self.behind is None else np.zeros_like(trusted))
+
+
+def _everywhere_behind(self: PyramidTexture, trusted: Any) -> Any:
+    if self.behind is None:
+        return known_of(self, trusted)
+    own = planes.Planes(self.behind.packed)
+    own.__dict__["raster"] = self.behind.raster
+    own.__dict__["support"] = np.ones_like(self.behind.support)
+    return known_of(replace(self, behind=own), trusted)
+
+
 bands_of, mirrored_of, level_of = Grid.bands, grid.mirrored_indices, LevelCoder.__init__
 grid_of, wave_of, escape_of = Grid.of, LevelCoder._wave, latents.Decoder._escape
 position_of, samples_of = pyramid._position, PyramidTexture._samples
 unpack_of, premultiplied_of = pyramid.unpack, compose.premultiplied
-moved_of = Occlusion.moved
+moved_of, known_of = Occlusion.moved, PyramidTexture._known
+copies_of, weights_of, bases_of = completion.unpack, completion._weights, completion._bases
 
 _FAULTS: dict[str, list[Patch]] = {
     "causal-off-by-one": [(context, "CAUSAL", (*registered_model.CAUSAL[:-1], (-1, 3)))],
@@ -222,6 +261,18 @@ _FAULTS: dict[str, list[Patch]] = {
     "keeps-rims-of-what-is-not-drawn": [(Pose, "still", _only_where)],
     "loses-rims-everywhere": [(Occlusion, "moved", _all_bare)],
     "loses-rims-of-what-moves-together": [(Occlusion, "moved", _back_bares)],
+    "ignores-behind": [(pyramid, "unpack", _without("behind", "behind_alpha"))],
+    "ignores-alpha-behind": [(pyramid, "unpack", _without("behind_alpha"))],
+    "behind-over-trusted": [(PyramidTexture, "_known", _over_trusted)],
+    "behind-without-cells": [(PyramidTexture, "_known", _everywhere_behind)],
+    "ignores-references": [(pyramid, "unpack", _without("copies"))],
+    "offsets-down-first": [(pyramid, "unpack", _down_first)],
+    "sources-without-upper-bits": [(pyramid, "unpacked_copies", _low_sources)],
+    "copies-without-overlap": [(completion, "_weights", _nearest_cell)],
+    "copies-what-is-not-known": [(completion, "_bases",
+        lambda values, known, copies: bases_of(values, np.ones_like(known), copies))],
+    "copies-without-rim": [(completion, "diffused", lambda value, *how: 0 * value)],
+    "copies-not-clamped": [(completion, "FILL_ONE", 1 << 30)],
     "trusts-samples-near": [(occlusion, "REACH", 1)],
 }  # fmt: skip
 

@@ -99,6 +99,9 @@ _TOPICS = {
     "pyramid: cuts": "PYR-40 PYR-41",
     "pyramid: fill": "PYR-42",
     "pyramid: moved": "PYR-46",
+    "pyramid: behind": "PYR-47",
+    "pyramid: copies": "PYR-48 PYR-49",
+    "pyramid: rim": "PYR-50",
     # Rendering.
     "opaque": "CHK-3 REN-12",
     "alpha": "TEX-18 REN-7 REN-12",

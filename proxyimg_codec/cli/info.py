@@ -16,8 +16,11 @@ from ..io.files import naming, read_bytes
 from .common import add_limits, limits_of, parser, printable, run
 
 CODERS = {texr.IMPLICIT: "implicit", texr.PYRAMID: "pyramid"}
-VIEWED = ("grid", "bits", "network", "planes", "part", "cuts")
+VIEWED = ("grid", "bits", "network", "planes", "part", "cuts", "grain")
 """Fields of textures that are printed unchanged; each coder has only some of them."""
+
+PLANES = ("alpha", "behind", "behind_alpha")
+"""Fields of textures that are 0, or the number of planes and 1."""
 
 SAMPLINGS = ("direct", "node", "node, local only", "node, global only")
 
@@ -111,7 +114,8 @@ def _texture(c: Container, i: int) -> dict[str, Any]:
     return {
         "coder": CODERS[texture["coder"]],
         **{k: texture.get(k) for k in VIEWED},
-        "alpha": texture["alpha"] - 1 if texture.get("alpha") else None,
+        **{k: texture[k] - 1 if texture.get(k) else None for k in PLANES},
+        "offsets": len(texture["offsets"]) // 2 if "offsets" in texture else None,
         "sampling": SAMPLINGS[c.layers[i]["sampling"]],
         "shares": c.textures[i].get("texture"),
     }
@@ -122,7 +126,7 @@ def _texture_bytes(c: Container, i: int) -> int:
     texture = c.texture_of(i)
     if texture is not c.textures[i]:
         return 0
-    return sum(len(texture.get(k, b"")) for k in ("codes", "stored", "mask"))
+    return sum(len(texture.get(k, b"")) for k in ("codes", "stored", "mask", "sources"))
 
 
 def _network(n: Mapping[str, Any]) -> dict[str, Any]:
@@ -232,7 +236,12 @@ def _texture_text(layer: dict[str, Any]) -> str:
     alpha = "" if layer["alpha"] is None else f" with alpha of planes {layer['alpha']}"
     outlines = ", ".join(str(n) for n in layer["cuts"])
     cuts = f" cut by layer{'s' * (len(layer['cuts']) > 1)} {outlines}" if outlines else ""
-    return f"{width}x{height} samples at {x},{y} of planes {layer['planes']}{alpha}{cuts}"
+    own = "" if layer["behind"] is None else f", planes {layer['behind']} behind"
+    if layer["behind_alpha"] is not None:
+        own += f" with alpha of planes {layer['behind_alpha']}"
+    if layer["offsets"]:
+        own += f", {layer['offsets']} offsets for cells of {1 << layer['grain']} samples"
+    return f"{width}x{height} samples at {x},{y} of planes {layer['planes']}{alpha}{cuts}{own}"
 
 
 def _network_text(n: dict[str, Any]) -> str:

@@ -148,7 +148,7 @@ def _one_layer(chunks: Sequence[Chunk]) -> list[Chunk]:
     box = [0, 0, *size]
     layer = {"name": "back", "box": box, "sampling": 0, **boundary.encode(None)}
     view = {"coder": texr.PYRAMID, "planes": 0, "alpha": 0, "part": box}
-    view |= {"cell": 0, "mask": b"", "cuts": []}
+    view |= {"cell": 0, "mask": b"", "cuts": [], **texr.ABSENT}
     return [
         Chunk(head.TYPE, pack(head.FIELDS, {**header, "layers": 1, "networks": 0})),
         Chunk(layr.TYPE, pack(layr.FIELDS, layer)),

@@ -22,6 +22,7 @@ from ..model import Layer, Layers, Picture
 from ..texture import implicit, network, planes, pyramid
 from ..texture.network import Network
 from ..texture.occlusion import Occlusion
+from ..texture.planes import Planes
 from ..texture.pyramid import Texture
 
 
@@ -50,7 +51,8 @@ def unpack(c: Container, budget: Budget, damage: tuple[str, ...] = ()) -> Pictur
     timeline, moves = motion(c.motion, meshes, budget)
     parents, groups = _parents(c)
     outlines = [boundaries.decode(v, f"chunk LAYR {i}") for i, v in enumerate(c.layers)]
-    textures = _textures(c, networks, outlines)
+    sources = tuple(planes.unpack(v, f"chunk PLAN {i}") for i, v in enumerate(c.planes))
+    textures = _textures(c, networks, sources, outlines)
     layers = [
         Layer(
             v["name"], _box(v), outlines[i], textures[i], meshes.get(i), v["sampling"],
@@ -63,7 +65,7 @@ def unpack(c: Container, budget: Budget, damage: tuple[str, ...] = ()) -> Pictur
         width, height, c.head["channels"], bool(c.head["opaque"]), c.head["depth"],
         Layers(layers), networks, _blocks(c), c.info,
         tuple(chunk for chunk in c.extra if chunk.type != PADDING),
-        groups, timeline, c.history, damage,
+        groups, timeline, c.history, damage, sources,
     )  # fmt: skip
 
 
@@ -86,10 +88,12 @@ def _parents(c: Container) -> tuple[list[str | None], dict[str, str | None]]:
 
 
 def _textures(
-    c: Container, networks: tuple[Network, ...], outlines: list[Boundary | None]
+    c: Container,
+    networks: tuple[Network, ...],
+    sources: tuple[Planes, ...],
+    outlines: list[Boundary | None],
 ) -> list[Texture]:
     """Textures of all layers; layers that share a texture get the same object."""
-    sources = [planes.unpack(v, f"chunk PLAN {i}") for i, v in enumerate(c.planes)]
     textures: list[Texture] = []
     for i, (layer, v) in enumerate(zip(c.layers, c.textures, strict=True)):
         where = f"chunk TEXR {i}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 from ..errors import FormatError, UnsupportedError
@@ -95,25 +96,20 @@ def _check_networks(c: Container, budget: Budget) -> None:
 
 
 def _check_planes(c: Container, budget: Budget) -> None:
-    """Checks that textures use every PLAN, in file order, and spends what decoding them costs."""
+    """Checks that textures use every PLAN, and spends what decoding them costs."""
     for planes in c.planes:
         columns, rows = (-(-n >> planes["levels"]) << planes["levels"] for n in planes["size"])
         budget.spend("wavefronts", columns + 3 * rows)
         budget.spend("samples", columns * rows)
-    used = 0
+    unused = set(range(len(c.planes)))
     for texture in c.textures:
-        if texture["coder"] != texr.PYRAMID:
-            continue
-        for number in (texture["planes"], texture["alpha"] - 1):
-            if number >= len(c.planes):
-                raise FormatError(f"planes {number} do not exist", "chunk TEXR", rule="PYR-3")
-            if number > used:
-                raise FormatError(
-                    "planes are not in the order of their first use", "chunk PLAN", rule="PYR-3"
-                )
-            used = max(used, number + 1)
-    if used < len(c.planes):
-        raise FormatError(f"planes {used} are not used", "chunk PLAN", rule="PYR-3")
+        if texture["coder"] == texr.PYRAMID:
+            for number in texr.planes_of(texture):
+                if number >= len(c.planes):
+                    raise FormatError(f"planes {number} do not exist", "chunk TEXR", rule="PYR-3")
+                unused.discard(number)
+    if unused:
+        raise FormatError(f"planes {min(unused)} are not used", "chunk PLAN", rule="PYR-3")
 
 
 def _check_textures(c: Container, budget: Budget) -> None:
@@ -142,18 +138,34 @@ def _check_textures(c: Container, budget: Budget) -> None:
             continue
         if pyramid:
             _check_cuts(c, i)
-            area = own["part"][2] * own["part"][3]
-            if own["mask"] or own["cuts"]:
-                budget.spend("filled", area)
-            # Where a layer is cut by its own boundary, the coverage of every layer behind it may
-            # be needed too [PYR-46].
-            budget.spend("covered", area * (len(own["cuts"]) + (i if i in own["cuts"] else 0)))
-            if not own["mask"]:
-                continue
-        rows, columns = texr.mask_shape(own) if pyramid else own["grid"][::-1]
-        budget.spend("wavefronts", columns + 2 * rows)
-        dim = 1 if pyramid else c.networks[own["network"]]["dim"]
-        budget.spend("codes", columns * rows * dim)
+            _check_behind(c, own)
+            _check_copies(own)
+            _spend_view(i, own, budget)
+        else:
+            _spend_array(budget, own["grid"][::-1], c.networks[own["network"]]["dim"])
+
+
+def _spend_view(number: int, own: Values, budget: Budget) -> None:
+    """Spends what decoding and filling the view of TEXR `number` costs, without its planes."""
+    area = own["part"][2] * own["part"][3]
+    if own["mask"] or own["cuts"]:
+        # Where samples are copied, how they differ from what lies beside them is filled, too.
+        budget.spend("filled", 2 * area if own["sources"] else area)
+    # Where a layer is cut by its own boundary, the coverage of every layer behind it may be needed
+    # too [PYR-46].
+    budget.spend("covered", area * (len(own["cuts"]) + (number if number in own["cuts"] else 0)))
+    if own["mask"]:
+        _spend_array(budget, texr.cells_shape(own), 1)
+    if own["sources"]:
+        channels, _ = texr.sources_bits(len(own["offsets"]) // 2)
+        _spend_array(budget, texr.cells_shape(own, "grain"), channels)
+
+
+def _spend_array(budget: Budget, shape: Sequence[int], channels: int) -> None:
+    """Spends what decoding a coded array costs."""
+    rows, columns = shape
+    budget.spend("wavefronts", columns + 2 * rows)
+    budget.spend("codes", columns * rows * channels)
 
 
 def _check_implicit(c: Container, layer: Values, texture: Values) -> int:
@@ -190,6 +202,38 @@ def _check_view(c: Container, layer: Values, texture: Values) -> int:
     if c.head["channels"] != 4:
         raise FormatError("more channels than HEAD has", "chunk TEXR", rule="PYR-38")
     return 4
+
+
+def _check_behind(c: Container, texture: Values) -> None:
+    """Checks `behind` and `behind_alpha` of a pyramid texture."""
+    if texture["behind_alpha"] and not (texture["behind"] and texture["alpha"]):
+        raise FormatError(
+            "behind_alpha without behind, or without alpha", "chunk TEXR", rule="PYR-47"
+        )
+    colour = {c.planes[texture["planes"]]["components"], 3}
+    for key, components in (("behind", colour), ("behind_alpha", {1})):
+        own = c.planes[texture[key] - 1] if texture[key] else None
+        if own and (own["size"] != texture["part"][2:] or own["components"] not in components):
+            raise FormatError(
+                f"planes of {key} have not the size of the part, or wrong components",
+                "chunk TEXR",
+                rule="PYR-47",
+            )
+
+
+def _check_copies(texture: Values) -> None:
+    """Checks `grain`, `offsets` and `sources` of a pyramid texture."""
+    offsets = texture["offsets"]
+    if bool(offsets) != bool(texture["sources"]):
+        raise FormatError(
+            "offsets without sources, or sources without offsets", "chunk TEXR", rule="PYR-48"
+        )
+    if texture["grain"] and not offsets:
+        raise FormatError("a grain without sources", "chunk TEXR", rule="PYR-48")
+    if len(offsets) % 2 or len(offsets) > 2 * texr.OFFSETS_MAX:
+        raise FormatError(
+            f"offsets are not pairs, or more than {texr.OFFSETS_MAX}", "chunk TEXR", rule="PYR-48"
+        )
 
 
 def _check_cuts(c: Container, number: int) -> None:

@@ -15,7 +15,7 @@ from .fields import Field, pack, unpack
 _STRUCTURE = (layr.TYPE, mesh.TYPE, pose.TYPE, netw.TYPE, plan.TYPE, texr.TYPE)
 _SINGLE = (meta.CICP_TYPE, meta.INFO_TYPE, tree.TYPE, motn.TYPE, undo.TYPE)
 _BLOCK_NAMES = {type_: name for name, type_ in meta.BLOCKS.items()}
-_FIELDS = {
+_FIELDS: dict[str, tuple[Field, ...]] = {
     **{m.TYPE: m.FIELDS for m in (head, layr, mesh, pose, netw, plan, tree, motn, undo)},
     **dict.fromkeys(_BLOCK_NAMES, meta.FIELDS),
     meta.CICP_TYPE: meta.CICP_FIELDS,
@@ -160,18 +160,23 @@ def fields_of(chunk: Chunk) -> tuple[Field, ...]:
     Raises:
         UnsupportedError: The texture coder is not known.
     """
-    return texr.fields_of(chunk.payload) if chunk.type == texr.TYPE else _FIELDS.get(chunk.type, ())
+    if chunk.type == texr.TYPE:
+        return texr.fields_of(chunk.payload, chunk.version)
+    return _FIELDS.get(chunk.type, ())
 
 
 def values(chunk: Chunk) -> Values:
     """Unpacks the values of a structured chunk, and checks each by itself.
+
+    Values that the version of the chunk does not have are as if they were not used.
 
     Raises:
         FormatError: A value is not as declared.
         UnsupportedError: The texture coder is not known.
     """
     where = f"chunk {chunk.type}" + ("" if chunk.offset is None else f" at byte {chunk.offset}")
-    return unpack(fields_of(chunk), chunk.payload, where, old=chunk.old)
+    found = unpack(fields_of(chunk), chunk.payload, where, old=chunk.old)
+    return texr.ABSENT | found if found.get("coder") == texr.PYRAMID else found
 
 
 def _renewed(steps: tuple[undo.Step, ...]) -> tuple[undo.Step, ...]:
@@ -184,13 +189,18 @@ def _renewed(steps: tuple[undo.Step, ...]) -> tuple[undo.Step, ...]:
     def renewed(chunk: Chunk) -> Chunk:
         payload = chunk.payload
         with contextlib.suppress(FormatError, UnsupportedError):
-            if chunk.old and (fields := fields_of(chunk)):
-                payload = pack(fields, unpack(fields, payload, "", old=True))
+            if chunk.old or chunk.type == texr.TYPE:
+                payload = _packed(chunk.type, values(chunk)) if fields_of(chunk) else payload
         return Chunk(chunk.type, payload)
 
     once = {id(chunk): chunk for step in steps for chunk in step.chunks}
     new = {key: renewed(chunk) for key, chunk in once.items()}
     return tuple(undo.Step(s.operation, tuple(new[id(c)] for c in s.chunks)) for s in steps)
+
+
+def _packed(type_: str, own: Values) -> bytes:
+    """Payload of a structured chunk in the present version."""
+    return pack(texr.CODERS[own["coder"]] if type_ == texr.TYPE else _FIELDS[type_], own)
 
 
 def serialize(c: Container) -> bytes:
@@ -214,7 +224,7 @@ def present(c: Container) -> list[Chunk]:
     ):  # fmt: skip
         chunks += [Chunk(module.TYPE, pack(module.FIELDS, v)) for v in values]
     for v in c.textures:
-        chunks.append(Chunk(texr.TYPE, pack(texr.CODERS[v["coder"]], v)))
+        chunks.append(Chunk(texr.TYPE, _packed(texr.TYPE, v)))
     for name, block in c.blocks.items():
         chunks.append(Chunk(meta.BLOCKS[name], meta.compress(block)))
     if c.cicp is not None:

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..errors import UnsupportedError
+from .chunks import VERSION
 from .fields import Field
 
 TYPE = "TEXR"
@@ -11,6 +12,20 @@ TYPE = "TEXR"
 SHARED, IMPLICIT, PYRAMID = 0, 1, 2
 """Numbers of the coders: the texture of an earlier layer; a plane of codes that a network of the
 file decodes; a view of the planes of a raster."""
+
+GRAIN_MAX = 6
+"""Largest binary logarithm of the side of a cell of sources."""
+
+OFFSETS_MAX = 255
+"""Most offsets of a texture, so that the number of one, or 0, fits 8 bits."""
+
+COMPLETED_FROM = (0, 11)
+"""First version whose pyramid textures have the fields of `ABSENT`."""
+
+ABSENT: dict[str, Any] = {
+    "behind": 0, "behind_alpha": 0, "grain": 0, "offsets": [], "sources": b"",
+}  # fmt: skip
+"""Values for what pyramid textures of earlier versions do not have."""
 
 _CODER = Field("coder", "int", "Texture coder: 0 = shared, 1 = implicit, 2 = pyramid.", 0, 255)
 
@@ -45,16 +60,33 @@ PYRAMID_FIELDS = (
           "to the layer; empty = all."),
     Field("cuts", "ints", "Ascending numbers of layers whose boundaries take samples from the "
           "layer: its own, and layers in front.", 0, 1 << 16),
+    Field("behind", "int", "0 = none, n = planes n - 1 give samples of the view's own that lie "
+          "behind what covers them.", 0, 1 << 16),
+    Field("behind_alpha", "int", "0 = opaque, n = planes n - 1 give the alpha of these.",
+          0, 1 << 16),
+    Field("grain", "int", "Side of a cell of `sources` is 2^grain samples; MUST be 0 without "
+          "these.", 0, GRAIN_MAX),
+    Field("offsets", "ints", "dx, dy in samples of up to 255 offsets at which hidden samples are "
+          "copied.", -(1 << 24), 1 << 24),
+    Field("sources", "bin", "Coded array of rows and columns of cells: the offset of each, counted "
+          "from 1; 0 = none; empty = none at all."),
 )  # fmt: skip
 
 CODERS = {SHARED: SHARED_FIELDS, IMPLICIT: FIELDS, PYRAMID: PYRAMID_FIELDS}
 """Fields of TEXR by coder."""
 
+_EARLIER = {**CODERS, PYRAMID: PYRAMID_FIELDS[: -len(ABSENT)]}
+"""Fields before version `COMPLETED_FROM`."""
 
-def fields_of(payload: bytes) -> tuple[Field, ...]:
+
+def fields_of(payload: bytes, version: tuple[int, int] = VERSION) -> tuple[Field, ...]:
     """Declared fields of a TEXR payload, which depend on the coder that it names.
 
     A payload that names none is taken for one of the implicit coder.
+
+    Args:
+        payload: Payload of the chunk.
+        version: Format version, major and minor, that it is written in.
 
     Raises:
         UnsupportedError: The coder is not known.
@@ -72,15 +104,34 @@ def fields_of(payload: bytes) -> tuple[Field, ...]:
             coder = int.from_bytes(second)
     if coder not in CODERS:
         raise UnsupportedError(f"chunk TEXR: texture coder {coder} is not known", rule="CHK-13")
-    return CODERS[coder]
+    return (CODERS if version >= COMPLETED_FROM else _EARLIER)[coder]
 
 
-def mask_shape(fields: Mapping[str, Any]) -> tuple[int, int]:
+def planes_of(fields: Mapping[str, Any]) -> list[int]:
+    """Numbers of the planes that a pyramid texture names, in the order of its fields."""
+    others = (fields[key] - 1 for key in ("alpha", "behind", "behind_alpha") if fields[key])
+    return [fields["planes"], *others]
+
+
+def cells_shape(fields: Mapping[str, Any], side: str = "cell") -> tuple[int, int]:
     """Rows and columns of the cells that cover the part of a pyramid texture.
 
     Args:
-        fields: Values of TEXR with `part` and `cell`.
+        fields: Values of TEXR.
+        side: Key of the binary logarithm of the side of a cell: ``cell`` for those of the mask,
+            ``grain`` for those of the sources.
     """
     _, _, width, height = fields["part"]
-    side = 1 << fields["cell"]
-    return -(-height // side), -(-width // side)
+    return -(-height >> fields[side]), -(-width >> fields[side])
+
+
+def sources_bits(offsets: int) -> tuple[int, int]:
+    """Number of channels of the array of sources, 1 or 2, and bits of each.
+
+    The second channel has the upper bits, so that all bits are coded with adaptive counts.
+
+    Args:
+        offsets: Number of offsets, 1..`OFFSETS_MAX`.
+    """
+    bits = offsets.bit_length()
+    return (1, bits) if bits <= 4 else (2, 4)

@@ -199,13 +199,10 @@ def brought(picture: Picture, home: Picture, origin: Layer, networks: list[Netwo
     """
     texture = origin.texture
     if isinstance(texture, PyramidTexture):
-        views = (v.texture for v in picture.layers if isinstance(v.texture, PyramidTexture))
-        known = [p for view in views for p in view.sources]
-        own, *alpha = (
-            next((p for p in known if p.packed == source.packed), source)
-            for source in texture.sources
+        known = picture.planes
+        return texture.renewed(
+            {p: next((q for q in known if q.packed == p.packed), p) for p in texture.sources}
         )
-        return replace(texture, planes=own, alpha=alpha[0] if alpha else None)
     brought = home.network_of(origin)
     assert brought is not None, "an implicit texture has a network"
     same = (i for i, v in enumerate(networks) if v.packed == brought.packed)

@@ -32,7 +32,9 @@ def fill(codes: NDArray[np.integer], stored: NDArray[np.bool_]) -> Values:
     return diffused(codes.astype(np.int32) << FRACTION_BITS, stored)
 
 
-def diffused(value: Values, known: NDArray[np.bool_]) -> Values:
+def diffused(
+    value: Values, known: NDArray[np.bool_], wanted: NDArray[np.bool_] | None = None
+) -> Values:
     """Fills unknown values by diffusion from the known ones [TEX-5 to TEX-9].
 
     Pull: each level halves the plane. A cell is the mean, rounded half up, of its known children,
@@ -43,6 +45,8 @@ def diffused(value: Values, known: NDArray[np.bool_]) -> Values:
     Args:
         value: int32 [C, H, W] values below 2**24 in magnitude; unknown ones have no influence.
         known: bool [H, W], True at known positions, of which there is at least one.
+        wanted: bool [H, W], True where the result is needed; None = everywhere. Elsewhere it may be
+            anything.
 
     Returns:
         int32 [C, H, W]; `value` itself if all is known.
@@ -52,7 +56,7 @@ def diffused(value: Values, known: NDArray[np.bool_]) -> Values:
     coarse = diffused(*_pull(value, known))
     h, w = known.shape
     parent = coarse.repeat(2, 1)[:, :h].repeat(2, 2)[:, :, :w]
-    return _smooth(np.where(known, value, parent), known)
+    return _smooth(np.where(known, value, parent), known, known if wanted is None else ~wanted)
 
 
 def _pull(value: Values, known: NDArray[np.bool_]) -> tuple[Values, NDArray[np.bool_]]:
@@ -68,8 +72,8 @@ def _pull(value: Values, known: NDArray[np.bool_]) -> tuple[Values, NDArray[np.b
     return (2 * total + count) // np.maximum(2 * count, 1), count > 0
 
 
-def _smooth(value: Values, known: NDArray[np.bool_]) -> Values:
-    """Sweeps the unknown positions of a plane, tile by tile.
+def _smooth(value: Values, known: NDArray[np.bool_], done: NDArray[np.bool_]) -> Values:
+    """Sweeps the unknown positions of a plane, tile by tile; not tiles of which all is `done`.
 
     Each tile is swept together with a rim of `SWEEPS` positions. An influence moves on by one
     position per sweep, so the cut-off outside of the rim cannot reach the tile.
@@ -77,7 +81,7 @@ def _smooth(value: Values, known: NDArray[np.bool_]) -> Values:
     h, w = known.shape
     out = value.copy()
     for y, x in product(range(0, h, TILE), range(0, w, TILE)):
-        if known[y : y + TILE, x : x + TILE].all():
+        if done[y : y + TILE, x : x + TILE].all():
             continue
         top, left = max(y - SWEEPS, 0), max(x - SWEEPS, 0)
         part = (slice(top, y + TILE + SWEEPS), slice(left, x + TILE + SWEEPS))

@@ -1,8 +1,9 @@
 """Pyramid texture: a view of a part of a raster, sampled by an interpolating kernel.
 
 Several layers may be views of the same raster. A mask, and boundaries that cut, decide the samples
-that show in each. Hidden samples are filled smoothly, when they are first needed, from trusted
-ones: without cuts from all that show, with cuts from those that no other layer is mixed into.
+that show in each. Hidden samples are made when they are first needed: they come from a raster of
+the view's own, copy others (`texture.completion`), or are filled smoothly from trusted ones. These
+are without cuts all that show, with cuts those that no other layer is mixed into.
 """
 
 from __future__ import annotations
@@ -19,14 +20,13 @@ from ..container import texr
 from ..entropy import arrays
 from ..errors import FormatError
 from ..native import kernel
-from .diffusion import FRACTION_BITS, diffused
+from .completion import FILL_ONE, Copies, completed
+from .completion import unpack as unpacked_copies
+from .diffusion import Values, diffused
 from .implicit import Box, ImplicitTexture
 from .network import Floats, Network
 from .occlusion import ALL_IN_PLACE, Moved, Occlusion, Samples
 from .planes import Planes
-
-FILL_ONE = 255 << FRACTION_BITS
-"""Integer that stands for the sample 1.0 in the fill."""
 
 TAPS = 4
 """Number of samples, across and down, that a point is interpolated from."""
@@ -48,6 +48,12 @@ class PyramidTexture:
         mask: bool [rows, columns], True for the cells, from the corner of `part` on, that belong to
             the layer; None = all.
         cuts: Boundaries that cut the view, together with the mask; or None.
+        behind: Planes of the view's own, of the size of `part`, with samples for what does not
+            show or is not trusted; None if there are none. They have as many components as
+            `planes`, or 3.
+        behind_alpha: Planes of the alpha of `behind`, of the same size; None if that is opaque, or
+            there is no `alpha`.
+        copies: References of hidden samples to others that they copy, or None.
         network: Always None: no network of the file is needed.
     """
 
@@ -57,12 +63,16 @@ class PyramidTexture:
     cell: int = 0
     mask: NDArray[np.bool_] | None = None
     cuts: Occlusion | None = None
+    behind: Planes | None = None
+    behind_alpha: Planes | None = None
+    copies: Copies | None = None
     network: ClassVar[None] = None
 
     @property
     def arrays(self) -> tuple[NDArray[Any], ...]:
         """Arrays of the texture, without those of its planes."""
-        return () if self.mask is None else (self.mask,)
+        own = () if self.mask is None else (self.mask,)
+        return own if self.copies is None else (*own, *self.copies.arrays)
 
     def channels(self, networks: Sequence[Network]) -> int:
         """Number of channels: 3, or 4 with alpha; `networks` is not used."""
@@ -70,8 +80,16 @@ class PyramidTexture:
 
     @property
     def sources(self) -> tuple[Planes, ...]:
-        """Planes that the view needs: those of colour, and of alpha if there is any."""
-        return (self.planes,) if self.alpha is None else (self.planes, self.alpha)
+        """Planes that the view needs: those of colour, alpha, `behind` and its alpha."""
+        found = (self.planes, self.alpha, self.behind, self.behind_alpha)
+        return tuple(p for p in found if p is not None)
+
+    def renewed(self, new: Mapping[Planes, Planes]) -> PyramidTexture:
+        """View of other planes: those that `new` has for each of `sources`."""
+        names = ("planes", "alpha", "behind", "behind_alpha")
+        own = ((name, getattr(self, name)) for name in names)
+        changed: dict[str, Any] = {name: new[p] for name, p in own if p is not None}
+        return replace(self, **changed)
 
     @cached_property
     def coded_mask(self) -> bytes:
@@ -81,7 +99,7 @@ class PyramidTexture:
         return arrays.encode(self.mask[None].astype(np.int64), 1, np.ones(self.mask.shape, bool))
 
     def masked(self, moved: Moved, cuts: Occlusion | None = None) -> PyramidTexture:
-        """Replaces cuts by a mask.
+        """Replaces cuts by a mask. What is behind is dropped where all samples show.
 
         The mask has cells of 2x2 samples, and holds those whose samples all show when neighbours
         have moved; if there are none, those of which any sample shows.
@@ -103,7 +121,10 @@ class PyramidTexture:
         if not mask.any():
             mask = np.logical_or.reduce(corners)
         if mask.all():
-            return replace(self, cell=0, mask=None, cuts=cuts)
+            whole_view = replace(self, cell=0, mask=None, cuts=cuts)
+            if cuts is not None:
+                return whole_view
+            return replace(whole_view, behind=None, behind_alpha=None, copies=None)
         if cuts is not None:
             cuts = replace(cuts, within=_samples(mask, 1, self.part))
         return replace(self, cell=1, mask=mask, cuts=cuts)
@@ -124,6 +145,10 @@ class PyramidTexture:
             "cell": self.cell if mask else 0,
             "mask": mask,
             "cuts": list(cuts),
+            **texr.ABSENT,
+            "behind": 0 if self.behind is None else 1 + numbers[self.behind],
+            "behind_alpha": 0 if self.behind_alpha is None else 1 + numbers[self.behind_alpha],
+            **({} if self.copies is None else self.copies.fields),
         }
 
     @cached_property
@@ -143,22 +168,52 @@ class PyramidTexture:
 
     @kernel.Computed
     def filled(self) -> NDArray[np.uint16]:
-        """Samples of the part, filled by diffusion from the trusted ones.
+        """Samples of the part: trusted ones, and what is behind, copied or filled for the others.
 
-        uint16 [height * width, C] in 1/`FILL_ONE`, where C counts the components of colour, and
-        alpha as the last one. Only defined if not all samples show.
+        uint16 [height * width, C] in 1/`FILL_ONE`, where C counts the components of colour, the
+        most that `planes` and `behind` have, and alpha as the last one. Only defined if not all
+        samples show.
 
         Raises:
             FormatError: The planes are corrupt.
         """
         trusted = self.shown if self.cuts is None else self.cuts.trusted
         assert trusted is not None, "nothing is to be filled"
-        x, y, width, height = self.part
-        rasters = [p.raster[y : y + height, x : x + width] for p in self.sources]
-        values = np.concatenate([np.moveaxis(r, 2, 0) for r in rasters])
-        fixed = np.rint(values * np.float32(FILL_ONE)).astype(np.int32)
-        out = diffused(fixed, trusted).astype(np.uint16)
+        values, known = self._known(trusted)
+        if self.copies is not None:
+            values, known = completed(values, known, self.copies)
+        out = diffused(values, known).astype(np.uint16)
         return np.ascontiguousarray(np.moveaxis(out, 0, 2)).reshape(-1, len(out))
+
+    def _known(self, trusted: Samples) -> tuple[Values, Samples]:
+        """Samples that are known before any is copied or filled [PYR-42, PYR-47].
+
+        Args:
+            trusted: bool [height, width], True for trusted samples.
+
+        Returns:
+            int32 [C, height, width] samples in 0..`FILL_ONE`, and bool [height, width], True for
+            known ones.
+        """
+        x, y, width, height = self.part
+        colours = max(p.components for p in (self.planes, self.behind) if p is not None)
+
+        def fixed(colour: Planes, alpha: Planes | None, x: int, y: int) -> Values:
+            count = colours + (self.alpha is not None)
+            out = np.full((count, height, width), FILL_ONE, np.int32)
+            for planes, at in ((colour, slice(colours)), (alpha, slice(colours, count))):
+                if planes is not None:
+                    part = planes.raster[y : y + height, x : x + width]
+                    out[at] = np.rint(np.moveaxis(part, 2, 0) * np.float32(FILL_ONE))
+            return out
+
+        values = fixed(self.planes, self.alpha, x, y)
+        if self.behind is None:
+            return values, trusted
+        cells, side = self.behind.support, self.behind.packed["cell"]
+        stored = _samples(cells, side, self.part)
+        own = fixed(self.behind, self.behind_alpha, 0, 0)
+        return np.where(stored & ~trusted, own, values), stored | trusted
 
     def sample(
         self,
@@ -237,22 +292,24 @@ class PyramidTexture:
     ) -> Floats:
         """Premultiplied samples [N, `channels`] at rows and columns [N]; hidden ones are filled."""
         x, y, width, _ = self.part
-        parts = []
-        for planes in self.sources:
-            at = (row + y) * planes.size[0] + (column + x)
-            parts.append(planes.raster.reshape(-1, planes.components).take(at, 0))
+        at = (row + y) * self.planes.size[0] + (column + x)
+        colour, alpha = (
+            None if p is None else p.raster.reshape(-1, p.components).take(at, 0)
+            for p in (self.planes, self.alpha)
+        )  # fmt: skip
+        assert colour is not None
+        if colour.shape[1] == 1:
+            colour = colour.repeat(3, 1)
         if kept is not None:
             place = row * width + column
             outside = np.flatnonzero(~kept.ravel().take(place))
             if len(outside):
                 fill = self.filled.take(place[outside], 0) * np.float32(1 / FILL_ONE)
-                parts[0][outside] = fill[:, : self.planes.components]
-                if self.alpha is not None:
-                    parts[1][outside] = fill[:, -1:]
-        colour = parts[0] if self.planes.components == 3 else parts[0].repeat(3, 1)
-        if self.alpha is None:
-            return colour
-        return np.concatenate([colour * parts[1], parts[1]], axis=1)
+                colours = fill.shape[1] - (alpha is not None)
+                colour[outside] = fill[:, :colours]
+                if alpha is not None:
+                    alpha[outside] = fill[:, -1:]
+        return colour if alpha is None else np.concatenate([colour * alpha, alpha], axis=1)
 
 
 Texture = ImplicitTexture | PyramidTexture
@@ -318,20 +375,24 @@ def unpack(
         cuts: Boundaries that cut the view, without the mask; or None.
 
     Raises:
-        FormatError: The mask is corrupt, full or empty.
+        FormatError: The mask or the sources are corrupt; the mask is full or empty.
     """
     x, y, width, height = part = fields["part"]
     mask = None
     if fields["mask"]:
-        shape = texr.mask_shape(fields)
+        shape = texr.cells_shape(fields)
         mask = arrays.decode(fields["mask"], (1, *shape), 1, np.ones(shape, bool))[0].astype(bool)
         if mask.all() or not mask.any():
             raise FormatError("the mask of the view is full or empty", where, rule="PYR-39")
         if cuts is not None:
             cuts = replace(cuts, within=_samples(mask, fields["cell"], part))
-    alpha = planes[fields["alpha"] - 1] if fields["alpha"] else None
-    texture = PyramidTexture(
-        planes[fields["planes"]], alpha, (x, y, width, height), fields["cell"], mask, cuts
+    alpha, behind, behind_alpha = (
+        planes[fields[key] - 1] if fields[key] else None
+        for key in ("alpha", "behind", "behind_alpha")
     )
+    texture = PyramidTexture(
+        planes[fields["planes"]], alpha, (x, y, width, height), fields["cell"], mask, cuts,
+        behind, behind_alpha, unpacked_copies(fields, where),
+    )  # fmt: skip
     texture.__dict__["coded_mask"] = fields["mask"]
     return texture

@@ -86,8 +86,9 @@ class Streams:
                 work: Callable[[], Any] = partial(implicit.unpack, v, tuple(nets), "", sampling)
                 parts: list[object] = [v, *sources, sampling == 1]
             elif v["coder"] == texr.PYRAMID:
-                sources = [rasters[k] for k in (v["planes"], v["alpha"] - 1) if k >= 0]
-                cost = prod(texr.mask_shape(v)) if v["mask"] else 1
+                sources = [rasters[k] for k in texr.planes_of(v)]
+                cost = prod(texr.cells_shape(v)) if v["mask"] else 1
+                cost += prod(texr.cells_shape(v, "grain")) if v["sources"] else 0
                 work = partial(pyramid.unpack, v, rasters, "")
                 parts = [v, *sources]
             else:
@@ -110,7 +111,7 @@ class Streams:
                 key = id(v), id(picture.networks[v["network"]]), id(layer.sampling == 1)
                 self._results[key] = layer.texture
             elif v["coder"] == texr.PYRAMID:
-                sources = (picture.planes[k] for k in (v["planes"], v["alpha"] - 1) if k >= 0)
+                sources = (picture.planes[k] for k in texr.planes_of(v))
                 self._results[id(v), *map(id, sources)] = layer.texture
 
     def _once(

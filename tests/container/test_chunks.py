@@ -71,7 +71,7 @@ def test_bad_type_is_refused():
 def test_other_versions_are_unsupported_not_invalid():
     data = bytearray(FILE)
     data[8] = 1
-    with pytest.raises(UnsupportedError, match=r"1\.10"):
+    with pytest.raises(UnsupportedError, match=r"1\.11"):
         read(bytes(data))
 
 
@@ -86,7 +86,8 @@ def test_other_versions_are_unsupported_not_invalid():
         (8, False),
         (9, True),
         (10, True),
-        (11, False),
+        (11, True),
+        (12, False),
     ],
 )
 def test_known_versions_are_read(minor, known):
@@ -96,7 +97,8 @@ def test_known_versions_are_read(minor, known):
         assert len(read(bytes(data))) == 3
         return
     with pytest.raises(
-        UnsupportedError, match=rf"0\.{minor}, this program reads 0\.1, 0\.2, 0\.3, 0\.9, 0\.10;"
+        UnsupportedError,
+        match=rf"0\.{minor}, this program reads 0\.1, 0\.2, 0\.3, 0\.9, 0\.10, 0\.11;",
     ):
         read(bytes(data))
 

@@ -13,6 +13,7 @@ from proxyimg_codec.container.texr import PYRAMID_FIELDS
 from proxyimg_codec.errors import FormatError, LimitError
 from proxyimg_codec.limits import Limits
 from proxyimg_codec.model import Layers
+from proxyimg_codec.texture.completion import Copies
 from tests.support import pyramids
 from tests.support.containers import refused
 from tests.support.images import changed
@@ -51,8 +52,8 @@ def test_planes_stand_once_between_networks_and_textures(pyramid, soft):
     assert [c.type for c in read(soft.to_bytes())].count("PLAN") == 2
 
 
-def test_planes_are_numbered_by_first_use(soft, several):
-    """Back to front, colour before alpha."""
+def test_new_planes_are_numbered_by_first_use(soft, several):
+    """Back to front, colour before alpha; what there was keeps its number."""
 
     def numbers(image):
         c = parse(image.to_bytes())
@@ -63,7 +64,7 @@ def test_planes_are_numbered_by_first_use(soft, several):
     assert numbers(several) == (["one", "two"], [(0, 0), (1, 0), (1, 0)])
     back, bar, disc = several.layers
     other = changed(several, opaque=False, layers=Layers([bar, back, disc]))
-    assert numbers(other) == (["two", "one"], [(0, 0), (1, 0), (0, 0)])
+    assert numbers(other) == (["one", "two"], [(1, 0), (0, 0), (1, 0)])
 
 
 def test_equal_views_are_stored_once(pyramid):
@@ -96,8 +97,17 @@ VIEWS = [
     (2, {"alpha": 2}, "TEXR: planes 1 do not exist"),
     (1, {"cell": 1}, "TEXR: cells without a mask"),
     (0, {"alpha": 1}, "TEXR: planes of alpha are not grey"),
-    (2, {"coder": 1}, "TEXR.*field 'grid' is not of type ints"),
-    (2, {"coder": 0}, "TEXR.*7 values instead of 2: coder, texture"),
+    (2, {"coder": 1}, "TEXR.*12 values instead of 7: coder, network"),
+    (2, {"coder": 0}, "TEXR.*payload is not valid msgpack"),
+    (1, {"behind": 2}, "TEXR: planes 1 do not exist"),
+    (0, {"behind_alpha": 1}, "TEXR: behind_alpha without behind, or without alpha"),
+    (0, {"behind": 1, "behind_alpha": 1}, "TEXR: behind_alpha without behind, or without alpha"),
+    (2, {"behind": 1}, "TEXR: planes of behind have not the size of the part"),
+    (2, {"grain": 1}, "TEXR: a grain without sources"),
+    (2, {"offsets": [1, 1]}, "TEXR: offsets without sources"),
+    (2, {"sources": b"x"}, "TEXR: offsets without sources, or sources without"),
+    (2, {"offsets": [1, 1, 1], "sources": b"x"}, "TEXR: offsets are not pairs"),
+    (2, {"offsets": [1] * 512, "sources": b"x"}, "TEXR: offsets are not pairs, or more than 255"),
 ]
 
 
@@ -115,7 +125,8 @@ def test_views_are_checked(pyramid, number, values, message):
 @pytest.mark.parametrize(
     ("key", "value"),
     [("cell", 7), ("cell", -1), ("planes", -1), ("alpha", (1 << 16) + 1), ("part", [0, 0, 1]),
-     ("part", [-1, 0, 2, 2])],
+     ("part", [-1, 0, 2, 2]), ("behind", -1), ("behind_alpha", (1 << 16) + 1), ("grain", 7),
+     ("offsets", [0, (1 << 24) + 1]), ("offsets", [-(1 << 24) - 1, 0])],
 )  # fmt: skip
 def test_fields_have_ranges(pyramid, key, value):
     container = parse(pyramid.to_bytes())
@@ -142,12 +153,12 @@ def test_nodes_need_an_implicit_texture(pyramid, sampling):
         refused(image.baked(), "layers", number, {"sampling": sampling}, message)
 
 
-def test_planes_are_all_used_and_in_order(several):
+def test_planes_are_all_used_in_any_order(several):
     c = parse(several.to_bytes())
     back, bar, disc = c.textures
     for textures, message in (
         ((back, {**bar, "planes": 0}, {**disc, "planes": 0}), "PLAN: planes 1 are not used"),
-        (({**back, "planes": 1}, bar, disc), "PLAN: planes are not in the order"),
+        (({**back, "planes": 1}, bar, disc), "PLAN: planes 0 are not used"),
     ):
         with pytest.raises(FormatError, match=message):
             parse(serialize(replace(c, textures=textures)))
@@ -157,11 +168,48 @@ def test_planes_are_all_used_and_in_order(several):
         parse(serialize(replace(c, planes=c.planes[:1])))
 
 
-def test_alpha_comes_after_its_colour(soft):
+def test_planes_keep_the_order_of_their_file(soft):
     c = parse(soft.to_bytes())
     swapped = tuple({**t, "planes": 1, "alpha": 1} for t in c.textures)
-    with pytest.raises(FormatError, match="PLAN: planes are not in the order"):
-        parse(serialize(replace(c, planes=c.planes[::-1], textures=swapped)))
+    data = serialize(replace(c, planes=c.planes[::-1], textures=swapped))
+    again = pxi.from_bytes(data)
+    assert again.to_bytes() == data
+    np.testing.assert_array_equal(again.render(), soft.render())
+
+
+def test_what_is_behind_comes_back(several, soft):
+    """Planes behind and their alpha are planes like others; references keep their bytes."""
+    bar, part = soft.layers["bar"], soft.layers["bar"].texture.part
+    own, alpha = planes("own", part[2:]), planes("own soft", part[2:], 1)
+    references = Copies(2, np.array([[4, -3], [-9, 0]], np.int32), np.full((3, 15), 2, np.uint8))
+    shown = replace(bar.texture, behind=own, behind_alpha=alpha, copies=references)
+    layers = [changed(v, texture=shown) if v.name == "bar" else v for v in soft.layers]
+    data = changed(soft, layers=Layers(layers)).to_bytes()
+    c = parse(data)
+    names = [v["data"].decode() for v in c.planes]
+    assert names == ["colour", "soft", "own", "own soft"]
+    assert [(t["behind"], t["behind_alpha"]) for t in c.textures] == [(0, 0), (3, 4), (0, 0)]
+    assert c.textures[1]["offsets"] == [4, -3, -9, 0]
+    again = pxi.from_bytes(data)
+    assert again.to_bytes() == data
+    view = again.layers["bar"].texture
+    assert view.behind is again.planes[2]
+    np.testing.assert_array_equal(view.copies.sources, references.sources)
+    assert not view.copies.sources.flags.writeable
+    only = changed(again, layers=Layers([again.layers["back"], again.layers["disc"]]))
+    assert len(only.planes) == 2, "planes that no layer names are dropped"
+
+
+BEHIND = [{"size": [60, 11]}, {"size": [59, 12]}, {"components": 1}]
+
+
+@pytest.mark.parametrize("values", BEHIND)
+def test_planes_behind_fit_the_part(pyramid, values):
+    bar = pyramid.layers["bar"]
+    shown = replace(bar.texture, behind=planes("own", bar.texture.part[2:]))
+    layers = [changed(v, texture=shown) if v.name == "bar" else v for v in pyramid.layers]
+    image = changed(pyramid, layers=Layers(layers))
+    refused(image, "planes", 1, values, "TEXR: planes of behind have not the size")
 
 
 @pytest.mark.parametrize("to", [1, -2])

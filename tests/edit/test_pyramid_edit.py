@@ -7,12 +7,17 @@ import numpy as np
 import pytest
 
 import proxyimg_codec as pxi
+from conformance.make.builders import polygon
+from proxyimg_codec.container.chunks import read
 from proxyimg_codec.errors import UsageError
+from proxyimg_codec.geometry.boundary import Boundary
 from proxyimg_codec.model import Layers
+from proxyimg_codec.texture.completion import Copies
+from proxyimg_codec.texture.occlusion import ALL_IN_PLACE, Occlusion
 from proxyimg_codec.texture.pyramid import PyramidTexture
 from tests.support.edits import EDITS, covered, grown
 from tests.support.images import changed
-from tests.support.pyramids import implicit, picture, planes, view
+from tests.support.pyramids import cut_picture, implicit, picture, planes, view
 
 
 def saved(image, path):
@@ -236,3 +241,70 @@ def test_cached_and_fresh_renders_agree(pyramid):
     pyramid.render()
     for edited in (pyramid.layers["disc"].rotated(40), pyramid.layers["disc"].textured("bar")):
         np.testing.assert_array_equal(edited.render(), pxi.from_bytes(edited.to_bytes()).render())
+
+
+def test_an_edit_that_adds_planes_numbers_no_others_anew(pyramid, tmp_path):
+    """Not even one of a layer behind all: its planes are appended, all other chunks stay."""
+    first = saved(picture(planes("first")), tmp_path / "first.pxi")
+    second = saved(picture(planes("second")), tmp_path / "second.pxi")
+    start = pyramid.layers["disc"].textured(first, "disc").baked()
+    edited = start.layers["bar"].textured(second, "bar")
+    edited = edited.layers["back"].textured(saved(picture(planes("third")), tmp_path / "3"), "back")
+    names = [p.packed["data"] for p in edited.planes]
+    assert names == [b"first", b"second", b"third"], "that of the back is not used any more"
+    only = start.layers["back"].textured(second, "back")
+    assert [p.packed["data"] for p in only.planes] == [b"colour", b"first", b"second"]
+    kinds = ("LAYR", "PLAN", "TEXR")
+    before, after = ([c for c in read(v.to_bytes()) if c.type in kinds] for v in (start, only))
+    new = [
+        c.type for c in after if (c.type, c.payload) not in {(b.type, b.payload) for b in before}
+    ]
+    assert new == ["PLAN", "TEXR"]
+    assert only.undone().to_bytes() == start.to_bytes()
+    assert pxi.from_bytes(only.to_bytes()).to_bytes() == only.to_bytes()
+
+
+def test_edits_keep_what_is_behind(pyramid):
+    """Moved, cut loose, renamed and given to others: planes behind and references stay."""
+    bar = pyramid.layers["bar"]
+    own = planes("own", bar.texture.part[2:])
+    references = Copies(2, np.array([[5, -1]], np.int32), np.ones((3, 15), np.uint8))
+    mask = np.ones((11, 59), bool)
+    mask[2:9, 9:30] = False
+    shown = replace(bar.texture, behind=own, copies=references, mask=mask)
+    layers = [changed(v, texture=shown) if v.name == "bar" else v for v in pyramid.layers]
+    image = changed(pyramid, layers=Layers(layers))
+    for edited in (
+        image.layers["bar"].moved(4, -9),
+        image.layers["disc"].removed(),
+        image.layers["bar"].renamed("other"),
+        image.layers["disc"].textured("bar"),
+        image.layers["bar"].recoloured(brightness=0.1),
+    ):
+        again = pxi.from_bytes(edited.to_bytes())
+        views = [v.texture for v in again.layers if v.texture.behind is not None]
+        assert views
+        for texture in views:
+            assert texture.behind.packed["data"] == b"own"
+            np.testing.assert_array_equal(texture.copies.offsets, references.offsets)
+        np.testing.assert_array_equal(again.render(), edited.render())
+        assert edited.undone().to_bytes() == image.to_bytes()
+
+
+def test_a_view_that_is_freed_of_its_cuts_keeps_what_is_behind(made_up_planes):
+    """Until all of it shows."""
+    image = cut_picture()
+    disc = image.layers["disc"]
+    own = planes("own", disc.texture.part[2:])
+    references = Copies(2, np.array([[5, -1]], np.int32), np.ones((8, 8), np.uint8))
+    shown = replace(disc.texture, behind=own, copies=references)
+    masked = shown.masked(shown.cuts.everything)
+    assert masked.mask is not None
+    assert (masked.behind, masked.copies) == (own, references)
+    whole = replace(
+        shown,
+        cuts=Occlusion(None, (Boundary(4, (polygon((-9, -9), (-8, -9), (-8, -8)),)),), disc.box),
+    )
+    freed = whole.masked(ALL_IN_PLACE)
+    assert freed.sources == (disc.texture.planes,)
+    assert freed.copies is None

@@ -1,5 +1,6 @@
 /** Chapter 3: the values of every chunk, and the rules between chunks. */
 
+import { sourcesShape } from "./copies.js";
 import { need, supported, within } from "./errors.js";
 import { MODEL_FILES } from "./model.js";
 import { Values } from "./msgpack.js";
@@ -64,8 +65,13 @@ const TEXTURES = [
   {
     coder: int(0, 255), planes: int(0, 2 ** 16), alpha: int(0, 2 ** 16),
     part: ints(0, 2 ** 24, 4), cell: int(0, 6), mask: bytes, cuts: ints(0, 2 ** 16),
+    behind: int(0, 2 ** 16), behind_alpha: int(0, 2 ** 16), grain: int(0, 6),
+    offsets: ints(-(2 ** 24), 2 ** 24), sources: bytes,
   },
 ];
+
+/** What a pyramid texture has in files of versions before 0.11 (CON-19). */
+const ABSENT = { behind: 0, behind_alpha: 0, grain: 0, offsets: [], sources: new Uint8Array() };
 
 /** A layer without POSE has this one (chapter 3). */
 export const REST = Object.freeze({
@@ -74,7 +80,7 @@ export const REST = Object.freeze({
 });
 
 /** Values of a payload by their keys (CON-14 to CON-18); that of an old file may be a map. */
-function unpack({ kind, payload, old }) {
+function unpack({ kind, payload, minor }) {
   let table = TABLES[kind];
   if (kind === "TEXR") {
     const values = new Values(payload);
@@ -86,10 +92,11 @@ function unpack({ kind, payload, old }) {
   }
   const values = new Values(payload);
   const { map, count } = values.header();
-  need(!map || old, `${kind} is a map`);
-  const keys = Object.keys(table);
+  need(!map || minor <= 3, `${kind} is a map`);
+  const absent = table === TEXTURES[2] && minor < 11 ? ABSENT : {};
+  const keys = Object.keys(table).filter((key) => !(key in absent));
   need(count === keys.length, `${kind} has ${count} values instead of ${keys.length}`);
-  const content = {};
+  const content = { ...absent };
   for (const key of keys) {
     if (map) need(values.string() === key, `${kind} lacks the key ${key} in its place`);
     content[key] = table[key].read(values);
@@ -184,15 +191,13 @@ function checkPlans({ plans, textures }, limits) {
     limits.spend("samples", columns * rows);
     limits.spend("wavefronts", columns + 3 * rows);
   }
-  let met = 0;
-  for (const { coder, planes, alpha } of textures) {
+  const met = new Set();
+  for (const { coder, planes, alpha, behind, behind_alpha: soft } of textures) {
     if (coder !== 2) continue;
-    for (const number of alpha ? [planes, alpha - 1] : [planes]) {
-      need(number <= met && number < plans.length, "planes are not in the order of their use");
-      met = Math.max(met, number + 1);
-    }
+    for (const number of [planes + 1, alpha, behind, soft].filter((n) => n)) met.add(number - 1);
   }
-  need(met === plans.length, "planes that no texture uses");
+  need([...met].every((number) => number < plans.length), "planes that do not exist");
+  need(met.size === plans.length, "planes that no texture uses");
 }
 
 function checkTexture({ head, layers, networks, plans, textures }, texr, k) {
@@ -214,7 +219,8 @@ function checkTexture({ head, layers, networks, plans, textures }, texr, k) {
 }
 
 /** PYR-38 to PYR-40. */
-function checkView({ head, layers, plans }, { planes, alpha, part, cell, mask, cuts }, k) {
+function checkView({ head, layers, plans }, texr, k) {
+  const { planes, alpha, part, cell, mask, cuts } = texr;
   const [x, y, w, h] = part;
   const { size } = plans[planes];
   need(w >= 1 && h >= 1 && x + w <= size[0] && y + h <= size[1], "a part is not in its raster");
@@ -224,12 +230,28 @@ function checkView({ head, layers, plans }, { planes, alpha, part, cell, mask, c
     need(other.size.every((n, i) => n === size[i]), "planes of alpha have another size");
   }
   need(mask.length || !cell, "a cell without a mask");
+  checkHidden(plans, texr);
   if (!cuts.length) return;
   need(w === layers[k].box[2] && h === layers[k].box[3], "a part with cuts is not as its box");
   cuts.forEach((c, i) => {
     need(c >= (i ? cuts[i - 1] + 1 : k) && c < layers.length, "cuts do not ascend in front");
     need(layers[c].segments.length, "a cut has no boundary");
   });
+}
+
+/** PYR-47 and PYR-48, but for what `sources` decode to. */
+function checkHidden(plans, texr) {
+  const { planes, alpha, part, behind, behind_alpha: soft, grain, offsets, sources } = texr;
+  need(!soft || (behind && alpha), "behind_alpha without behind, or without alpha");
+  for (const [number, components] of [[behind, [plans[planes].components, 3]], [soft, [1]]]) {
+    if (!number) continue;
+    const own = plans[number - 1];
+    need(own.size[0] === part[2] && own.size[1] === part[3], "planes behind are not as the part");
+    need(components.includes(own.components), "planes behind have other components");
+  }
+  need(offsets.length % 2 === 0 && offsets.length <= 510, "offsets are not up to 255 pairs");
+  need(!offsets.length === !sources.length, "sources or offsets without the other");
+  need(offsets.length || !grain, "a grain without sources");
 }
 
 /** CHK-3. */
@@ -284,7 +306,13 @@ function checkLimits({ layers, meshes, networks, textures, motion }, limits) {
         add("wavefronts", columns + 2 * rows);
         add("codes", columns * rows);
       }
-      if (texr.mask.length || texr.cuts.length) add("filled", w * h);
+      if (texr.sources.length) {
+        const [channels, rows, columns] = sourcesShape(texr);
+        add("wavefronts", columns + 2 * rows);
+        add("codes", channels * columns * rows);
+      }
+      const fills = texr.sources.length ? 2 : 1;
+      if (texr.mask.length || texr.cuts.length) add("filled", fills * w * h);
       add("covered", w * h * (texr.cuts.length + (texr.cuts.includes(k) ? k : 0)));
     }
   });

@@ -23,7 +23,7 @@ export function readChunks(data, limits) {
   limits.spend("file_bytes", data.length);
   need(data.length >= 12, "the file is shorter than its prefix");
   need(SIGNATURE.every((byte, i) => data[i] === byte), "this is not a .pxi file");
-  supported(data[8] === 0 && [1, 2, 3, 9, 10].includes(data[9]), `version ${data[8]}.${data[9]}`);
+  supported(data[8] === 0 && [1, 2, 3, 9, 10, 11].includes(data[9]), `version ${data[8]}.${data[9]}`);
   need(data[10] === 0 && data[11] === 0, "the reserved field is not 0");
   const view = new DataView(data.buffer, data.byteOffset, data.byteLength);
   const chunks = [];
@@ -37,7 +37,7 @@ export function readChunks(data, limits) {
     need(end + 4 <= data.length && end - at - 8 < 2 ** 31, `${kind} runs past the end of the file`);
     const crc = crc32(data.subarray(at, end));
     need(view.getUint32(end, true) === crc, `the CRC of ${kind} at offset ${at} is wrong`);
-    chunks.push({ kind, payload: data.subarray(at + 8, end), old: data[9] <= 3 });
+    chunks.push({ kind, payload: data.subarray(at + 8, end), minor: data[9] });
     at = end + 4;
     if (kind === "TAIL") break;
   }

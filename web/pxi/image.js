@@ -99,8 +99,8 @@ export class Image {
     return this.#once(cuts ? `view ${n} ${moving}` : `view of ${k}`, () => {
       const { motion } = this;
       const bodies = new Map(moving ? motion.layers.map((l, i) => [l, motion.bodies[i]]) : []);
-      const { layers, textures, poses, boundaries, limits } = this;
-      const scene = { layers, textures, poses, boundaries, limits, bodies };
+      const { layers, textures, plans, poses, boundaries, limits } = this;
+      const scene = { layers, textures, plans, poses, boundaries, limits, bodies };
       return viewOf(scene, n, k, (number) => this.raster(number));
     });
   }

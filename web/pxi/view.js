@@ -1,13 +1,12 @@
 /** Chapter 8, "Views": the part of a raster that a layer shows, and what of it may be seen. */
 
 import { REST } from "./chunks.js";
+import { FILL_ONE, copy, decodeSources } from "./copies.js";
 import { decodeMask } from "./entropy.js";
 import { FULL, coverage, scalePaths } from "./geometry.js";
 import { Budget } from "./limits.js";
 import { Diffusion } from "./implicit.js";
 import { clamp } from "./integers.js";
-
-const FILL_ONE = 65280;
 
 /** Whether two layers rest on each other (PYR-46, MOT-9). */
 function rest({ poses, bodies }, a, b) {
@@ -103,28 +102,38 @@ function bareBehind(scene, n, k, covered, size) {
   return found;
 }
 
+/** Components [h, w] of a part of a raster. */
+function componentsOf({ columns, planes }, [x0, y0, w, h]) {
+  return planes.map((from) => {
+    const out = new Float32Array(w * h);
+    for (let y = 0; y < h; y++) {
+      const at = (y0 + y) * columns + x0;
+      out.set(from.subarray(at, at + w), y * w);
+    }
+    return out;
+  });
+}
+
 /**
  * The samples that layer n shows, premultiplied [h, w, 3 or 4] (PYR-42, PYR-44).
  *
  * `rasters(number)` gives the samples of a PLAN.
  */
 export function viewOf(scene, n, k, rasters) {
-  const { planes, alpha, part } = scene.textures[k];
-  const [x0, y0, w, h] = part;
+  const { planes, alpha, behind, part } = scene.textures[k];
+  const [, , w, h] = part;
   const { shown, trusted } = masksOf(scene, n, k);
-  const diffusion = shown && new Diffusion(trusted, h, w);
-  const component = ({ columns, planes: found }, c) => {
-    const from = found[Math.min(c, found.length - 1)];
-    const out = new Float32Array(w * h);
-    for (let y = 0; y < h; y++) {
-      const at = (y0 + y) * columns + x0;
-      out.set(from.subarray(at, at + w), y * w);
-    }
-    return shown ? filled(out, shown, trusted, diffusion) : out;
-  };
-  const raster = rasters(planes);
-  const colours = raster.planes.map((_, c) => component(raster, c));
-  const share = alpha ? component(rasters(alpha - 1), 0) : null;
+  const sources = decodeSources(scene.textures[k]);
+  let colours = componentsOf(rasters(planes), part);
+  let share = alpha ? componentsOf(rasters(alpha - 1), part)[0] : null;
+  if (shown?.includes(0)) {
+    const count = Math.max(colours.length, behind ? scene.plans[behind - 1].components : 1);
+    const own = evenly(colours, count).concat(share ?? []);
+    const hidden = hiddenOf(scene, k, own, trusted, rasters, sources);
+    const merged = own.map((values, c) => values.map((v, i) => (shown[i] ? v : hidden[c][i] / FILL_ONE)));
+    share = share && merged.pop();
+    colours = merged;
+  }
   const channels = share ? 4 : 3;
   const samples = new Float32Array(w * h * channels);
   for (let i = 0, to = 0; i < w * h; i++, to += channels) {
@@ -135,14 +144,48 @@ export function viewOf(scene, n, k, rasters) {
   return { samples, channels, w, h };
 }
 
-/** One component with what does not show filled (PYR-42). */
-function filled(values, shown, trusted, diffusion) {
-  const whole = new Int32Array(values.length);
-  for (let i = 0; i < whole.length; i++) {
-    if (trusted[i]) whole[i] = Math.round(FILL_ONE * values[i]);
+/** Components of colour in a greater number: grey stands for three. */
+function evenly(colours, count) {
+  return colours.length < count ? new Array(count).fill(colours[0]) : colours;
+}
+
+/** Values of a component as whole numbers in 1/65280. */
+const whole = (values) => Int32Array.from(values, (v) => Math.round(FILL_ONE * v));
+
+/**
+ * Samples of TEXR k for what does not show, component by component in 1/65280 (PYR-42, PYR-47).
+ *
+ * `own` are those of its raster, alpha last.
+ */
+function hiddenOf({ textures, plans }, k, own, trusted, rasters, sources) {
+  const texr = textures[k];
+  const { part, alpha, behind, behind_alpha: soft } = texr;
+  const [, , w, h] = part;
+  const known = trusted.slice();
+  const values = own.map(whole);
+  if (behind) {
+    const { cell, support } = plans[behind - 1];
+    const [wide, high] = [w, h].map((n) => Math.ceil(n / 2 ** cell));
+    const stored = support.length ? decodeMask(support, high, wide) : null;
+    const at = [0, 0, w, h];
+    const count = values.length - (alpha ? 1 : 0);
+    const others = evenly(componentsOf(rasters(behind - 1), at), count).map(whole);
+    if (alpha) {
+      const ones = () => new Int32Array(w * h).fill(FILL_ONE);
+      others.push(soft ? whole(componentsOf(rasters(soft - 1), at)[0]) : ones());
+    }
+    for (let y = 0, i = 0; y < h; y++) {
+      for (let x = 0; x < w; x++, i++) {
+        if (known[i] || (stored && !stored[(y >> cell) * wide + (x >> cell)])) continue;
+        known[i] = 1;
+        values.forEach((value, c) => (value[i] = others[c][i]));
+      }
+    }
   }
-  diffusion.fill(whole);
-  return values.map((v, i) => (shown[i] ? v : whole[i] / FILL_ONE));
+  if (sources) copy(texr, sources, values, known);
+  const diffusion = new Diffusion(known, h, w);
+  values.forEach((value) => diffusion.fill(value));
+  return values;
 }
 
 /** Weights of cubic convolution (PYR-43). */

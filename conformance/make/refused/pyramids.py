@@ -107,12 +107,12 @@ def different(b: Base, at: int, **values: Any) -> Chunk:
     return changed(b.chunks[at], values)
 
 
-def _swapped(b: Base) -> bytes:
-    """File with planes that are not in the order of their first use."""
+def _between(b: Base) -> bytes:
+    """File with planes between others that no texture names."""
     back, disc = CLEAR_TEXR
     return write([
-        *b.chunks[:COLOUR], b.chunks[ALPHA], b.chunks[COLOUR],
-        different(b, back, planes=1, alpha=1), different(b, disc, planes=1), b.chunks[-1],
+        *b.chunks[:ALPHA], b.chunks[COLOUR], b.chunks[ALPHA],
+        different(b, back, alpha=3), b.chunks[disc], b.chunks[-1],
     ])  # fmt: skip
 
 
@@ -200,7 +200,7 @@ _STREAMS: list[Row] = [
 
 
 _ORDER: list[Row] = [
-    ("invalid-plan-use", "planes not in the order of their first use", "", _swapped),
+    ("invalid-plan-use", "planes between others that no texture names", "", _between),
 ]
 
 _LAST: list[Row] = [

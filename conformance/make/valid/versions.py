@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import msgpack
+
 from proxyimg_codec.codec.write import to_bytes
 from proxyimg_codec.container.chunks import read, write
+from proxyimg_codec.geometry.pose import Pose
 
 from ..builders import (
     Numbers,
@@ -15,6 +20,7 @@ from ..builders import (
     with_maps,
 )
 from ..registry import Valids
+from .views import pieces
 
 CASES = Valids()
 _case = CASES.case
@@ -39,6 +45,17 @@ def _version_0_3(n: Numbers) -> bytes:
 @_case("A file of version 0.9", "file: version")
 def _version_0_9(n: Numbers) -> bytes:
     return write(read(to_bytes(layered(n))), (0, 9))
+
+
+@_case("A file of version 0.10, whose pyramid textures end with cuts", "file: version", "CON-19",
+       "pyramid: cuts")  # fmt: skip
+def _version_0_10(n: Numbers) -> bytes:
+    """With what was possible in it alone."""
+    chunks = [
+        replace(c, payload=msgpack.packb(msgpack.unpackb(c.payload)[:7])) if c.type == "TEXR" else c
+        for c in read(to_bytes(pieces(n, {"disc": Pose(shift=(3 * 1024, -900))})))
+    ]
+    return write(chunks, (0, 10))
 
 
 @_case("A file of version 0.2 with arrays", "file: version", "fields: maps")
