@@ -208,11 +208,10 @@ def _shared(layer: Layer, boundary: Boundary) -> tuple[Part, Texture]:
     left, top, right, bottom = boundary.bounds()
     x, y, width, height = layer.box
     side = 1 << texture.cell  # cells of a mask begin at its corner
-    x0, y0 = (
-        max(low - MARGIN - start, 0) // side * side
-        for low, start in ((left, x), (top, y))
-    )  # fmt: skip
+    x0, y0 = (max(v, 0) // side * side for v in (left - MARGIN - x, top - MARGIN - y))
     x1, y1 = min(right + MARGIN - x, width), min(bottom + MARGIN - y, height)
+    if texture.behind is not None:  # it is stretched over the whole part
+        x0, y0, x1, y1 = 0, 0, width, height
     box = x + x0, y + y0, x1 - x0, y1 - y0
     mask = texture.mask
     if mask is not None:
@@ -233,7 +232,7 @@ def _shared(layer: Layer, boundary: Boundary) -> tuple[Part, Texture]:
         within(mask, cell, part),
     )
     return (
-        (box, PyramidTexture(texture.planes, texture.alpha, part, cell, mask, own)),
+        (box, replace(texture, part=part, cell=cell, mask=mask, cuts=own, copies=None)),
         replace(texture, cuts=replace(old, fronts=(*old.fronts, boundary))),
     )
 

@@ -210,8 +210,15 @@ def _joined(
     own = boundary if any(each and each.own for each in deciding) else None
     left = tuple(front for front in dict.fromkeys(fronts) if front in known and front is not None)
     new = Occlusion(own, left, box, within(mask, cell, part)) if own or left else None
-    if part == one.part:
-        return replace(one, cell=cell, mask=mask, cuts=new)
+    base = two if holder is high else one
+    hidden = [(v.behind, v.behind_alpha, v.copies) for v in (one, two)]
+    if part == base.part and (holder is not None or hidden[0] == hidden[1]):
+        return replace(base, cell=cell, mask=mask, cuts=new)
+    if any(any(own) for own in hidden):
+        raise UsageError(
+            f"merge: what others hide of {low.name!r} or {high.name!r} is stored beside the planes "
+            f"and cannot be joined; --group NAME={low.name},{high.name} edits them as one"
+        )
     return PyramidTexture(one.planes, one.alpha, part, cell, mask, new)
 
 

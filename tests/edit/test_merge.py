@@ -7,7 +7,7 @@ import proxyimg_codec as pxi
 from proxyimg_codec.edit.regions import coverage
 from proxyimg_codec.errors import UsageError
 from proxyimg_codec.geometry.coverage import FULL
-from tests.edit.test_cut import HEIGHT, WHERE, WIDTH, image, mask, round_
+from tests.edit.test_cut import HEIGHT, WHERE, WIDTH, image, mask, round_, with_more_behind
 from tests.support.edits import covered, grown
 from tests.support.pyramids import cut_picture, picture
 
@@ -51,6 +51,15 @@ def test_two_parts_become_one(image, mask):
         assert off.max() <= (0 if paths == 2 else 0.35)
         whole = both.layers["back"].merged("one")
         assert whole.baked().to_bytes() == image.to_bytes()
+
+
+def test_hidden_samples_stay_with_the_layer_that_holds_the_other(made_up_planes, mask):
+    image = with_more_behind()
+    both = image.layers["back"].merged("bar")
+    assert both.layers["back"].texture.behind is image.layers["back"].texture.behind
+    same_when_loaded(both)
+    with pytest.raises(UsageError, match="stored beside the planes"):
+        image.layers["bar"].merged("disc")
 
 
 def same_when_loaded(edited):
