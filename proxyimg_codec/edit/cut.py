@@ -135,11 +135,15 @@ def _mask(
         raise PxiError(f"cut needs {error.name}: pip install 'proxyimg-codec[encode]'") from None
     if mask is not None:
         return load_mask(mask, *picture.size)
-    alone = render(picture, layers=[layer.name])
+    pixels = alone = render(picture, layers=[layer.name])
+    if alone.shape[2] == 4:  # edges are found more easily where there is something beyond them
+        pixels = render(picture)
+        own = alone[..., 3] > 127
+        pixels[own] = alone[own][:, : pixels.shape[2]]
     named = "inside"
     hints = {named: [(x, y) for x, y in points]}
     others = {named: [(x, y) for x, y in outside]} if outside else None
-    found = find_layers(alone, points=hints, negatives=others)
+    found = find_layers(pixels, points=hints, negatives=others)
     return next(region.mask for region in found if region.name == named)
 
 
@@ -159,8 +163,8 @@ def _inside(
         raise UsageError(f"cut: {where} has nothing of layer {layer.name!r}; it lies elsewhere")
     if inside[eroded(full, layer.boundary is None)].all():
         raise UsageError(
-            f"cut: {where} has all of layer {layer.name!r}, nothing would be left of it; "
-            "--duplicate copies it"
+            f"cut: {where} has all of layer {layer.name!r}, nothing would be left; take less, for "
+            "points by others outside of it (@!X,Y), or --duplicate it"
         )
     texture = layer.texture
     if isinstance(texture, PyramidTexture) and texture.shown is not None:
