@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from . import model
 from .codec import read
 from .container.chunks import Chunk
-from .edit.methods import Editable, Insertable
+from .edit.methods import Editable, EditableImage
 from .errors import UnsupportedError
 from .handles import LayerHandle, MadeOnce, PictureHandle
 from .io.files import write_atomically
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from .encoder.shapes.mask_arrays import Masks
 
 
-class Image(PictureHandle, Insertable["Image"]):
+class Image(PictureHandle, EditableImage):
     """A `.pxi` picture in memory. Images are equal if their files are, and are pickled as files.
 
     Args:
@@ -92,52 +92,6 @@ class Image(PictureHandle, Insertable["Image"]):
     def _with(self, picture: model.Picture) -> Image:
         """Returns an image of another picture that shares the cache of this one."""
         return Image(picture, self.cache)
-
-    def edited(self, *operations: Mapping[str, Any]) -> Image:
-        """Returns the picture after `operations`, applied in order; each can be undone.
-
-        Args:
-            operations: Operations as in an edit script, such as
-                ``{"op": "move", "layer": "cat", "by": [40, -10]}``.
-
-        Raises:
-            UsageError: An operation is unknown, or cannot be applied.
-
-        Examples:
-            >>> import proxyimg_codec as pxi
-            >>> image = pxi.open("photo.pxi")
-            >>> moved = image.edited({"op": "move", "layer": "disc", "by": [6, -2]})
-            >>> len(moved.history)
-            1
-        """
-        if not operations:
-            return self
-        from .edit.script import apply
-
-        return self._with(apply(self._picture, operations))
-
-    def undone(self, steps: int = 1) -> Image:
-        """Returns the picture as it was before its last `steps` edits.
-
-        Raises:
-            UsageError: The history has fewer edits than that.
-
-        Examples:
-            >>> import proxyimg_codec as pxi
-            >>> image = pxi.open("photo.pxi")
-            >>> image.layers["disc"].hidden().undone() == image
-            True
-        """
-        from .edit.history import undone
-
-        return self._with(undone(self._picture, steps))
-
-    def baked(self) -> Image:
-        """Returns the same picture without its history.
-
-        Pixels of a removed layer stay in the file if other layers show parts of the same planes.
-        """
-        return self._with(replace(self._picture, history=()))
 
     def at(self, t: float) -> Image:
         """Returns one moment of an animated picture as a still picture.

@@ -54,6 +54,8 @@ def arguments() -> argparse.ArgumentParser:
         help="how long to optimize pictures that become textures or layers; default 2",
     )
     p.add_argument("--bake", action="store_true", help="forget the history of edits")
+    p.add_argument("--purge", action="store_true", help="after all edits, take out pixels that no "
+                   "layer shows, for good; forgets the history too")  # fmt: skip
     p.add_argument("--list", action="store_true", help="print layers, groups and history")
     add_limits(p)
     add_force_suffix(p)
@@ -89,9 +91,12 @@ def edit_file(args: argparse.Namespace) -> None:
     from ..io.files import write_atomically
 
     started = time.perf_counter()
-    picture = _edited(from_file(args.input, limits_of(args)), operations, args.quiet)
+    before = from_file(args.input, limits_of(args))
+    picture = _edited(before, operations, args.quiet)
     if args.bake:
         picture = replace(picture, history=())
+    if args.purge:
+        picture = _purged(args, picture)
     if args.list:
         facts = listing(picture)
         print(json.dumps(facts, indent=2) if args.json else text(facts))
@@ -104,7 +109,28 @@ def edit_file(args: argparse.Namespace) -> None:
         data = to_bytes(picture)
         write_atomically(args.output, data)
         size = len(data)
+        _say_what_stays(args, before, picture)
     _report(args, picture, size, time.perf_counter() - started)
+
+
+def _purged(args: argparse.Namespace, picture: Picture) -> Picture:
+    """Takes out what no layer shows, and says how much that was."""
+    from ..edit.purge import EFFORT, hidden_samples, purged
+
+    if not args.quiet:
+        edits = f", and the history of {n} edits" if (n := len(picture.history)) else ""
+        gone = hidden_samples(picture)
+        print(f"pxi-edit: purged {gone} samples that no layer shows{edits}", file=sys.stderr)
+    return purged(picture, args.effort or EFFORT)
+
+
+def _say_what_stays(args: argparse.Namespace, before: Picture, after: Picture) -> None:
+    """Says it if edits left pixels in the written file that no layer shows any more."""
+    from ..edit.purge import leaves_pixels
+
+    if not (args.quiet or args.purge) and leaves_pixels(before, after):
+        print("pxi-edit: pixels that no layer shows any more stay in the file; --purge takes them "
+              "out", file=sys.stderr)  # fmt: skip
 
 
 def _drawn(args: argparse.Namespace) -> bool:
@@ -131,7 +157,7 @@ def _check(args: argparse.Namespace, operations: Sequence[Values]) -> None:
             is needed twice.
         InputError: OUT exists and --force is not given, or it cannot be written.
     """
-    if args.output is None and (args.edits or args.bake or not args.list):
+    if args.output is None and (args.edits or args.bake or args.purge or not args.list):
         raise UsageError("OUT is missing; --list alone needs none")
     if args.output == "-" and (args.list or args.json):
         raise UsageError("a list or report and a picture cannot both go to standard output")

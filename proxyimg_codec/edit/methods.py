@@ -1,12 +1,121 @@
-"""Edits of a layer, or of a picture, as methods; each applies an operation of `operations`."""
+"""Edits as methods of pictures and of layers; those of layers are operations of `operations`."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Generic, TypeVar
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar
+
+if TYPE_CHECKING:
+    from ..model import Picture
 
 Pair = tuple[float, float]
 Edited = TypeVar("Edited")
+
+
+class EditableImage:
+    """Methods of a picture that return another one, after edits or before them."""
+
+    __slots__ = ()
+
+    @property
+    def picture(self) -> Picture:
+        """The picture as data."""
+        raise NotImplementedError  # only subclasses have one
+
+    def _with(self, picture: Picture) -> Self:
+        """Returns an image of another picture."""
+        raise NotImplementedError  # only subclasses can make one
+
+    def edited(self, *operations: Mapping[str, Any]) -> Self:
+        """Returns the picture after `operations`, applied in order; each can be undone.
+
+        Args:
+            operations: Operations as in an edit script, such as
+                ``{"op": "move", "layer": "cat", "by": [40, -10]}``.
+
+        Raises:
+            UsageError: An operation is unknown, or cannot be applied.
+
+        Examples:
+            >>> import proxyimg_codec as pxi
+            >>> image = pxi.open("photo.pxi")
+            >>> moved = image.edited({"op": "move", "layer": "disc", "by": [6, -2]})
+            >>> len(moved.history)
+            1
+        """
+        if not operations:
+            return self
+        from .script import apply
+
+        return self._with(apply(self.picture, operations))
+
+    def inserted(
+        self,
+        source: str,
+        layer: str | int | None = None,
+        *,
+        at: Pair | None = None,
+        over: str | int | None = None,
+        under: str | int | None = None,
+        name: str | None = None,
+        effort: int | None = None,
+    ) -> Self:
+        """Inserts a layer of another `.pxi` file, which is not encoded anew, or a picture file.
+
+        Args:
+            source: Name of the file.
+            layer: Name or position of a layer of a `.pxi` file; its front layer by default.
+            at: Canvas point for its centre; by default that in its own file if both pictures have
+                the same size, otherwise the middle of the canvas.
+            over: Name or position of the layer that it lies just in front of.
+            under: Name or position of the layer that it lies just behind.
+            name: Name of the new layer.
+            effort: How hard the encoder tries with a picture file, 1..9; by default 2.
+        """
+        given = {"source": source, "from_layer": layer, "at": at, "over": over, "under": under,
+                 "name": name, "effort": effort}  # fmt: skip
+        return self.edited({"op": "insert", **{k: v for k, v in given.items() if v is not None}})
+
+    def undone(self, steps: int = 1) -> Self:
+        """Returns the picture as it was before its last `steps` edits.
+
+        Raises:
+            UsageError: The history has fewer edits than that.
+
+        Examples:
+            >>> import proxyimg_codec as pxi
+            >>> image = pxi.open("photo.pxi")
+            >>> image.layers["disc"].hidden().undone() == image
+            True
+        """
+        from .history import undone
+
+        return self._with(undone(self.picture, steps))
+
+    def baked(self) -> Self:
+        """Returns the same picture without its history.
+
+        Pixels of a removed layer stay in the file if other layers show parts of the same planes;
+        `purged` takes them out.
+        """
+        return self._with(replace(self.picture, history=()))
+
+    def purged(self, effort: int = 2) -> Self:
+        """Returns the picture without its history, and without pixels that no layer can show.
+
+        What shows beside such pixels changes a little, see `edit.purge.purged`.
+
+        Args:
+            effort: How hard the encoder tries, 1..9.
+
+        Raises:
+            UsageError: The effort is out of range.
+            PxiError: The encoder, which this needs, is not installed.
+        """
+        from .purge import purged
+
+        return self._with(purged(self.picture, effort))
 
 
 class Editable(Generic[Edited]):
@@ -95,7 +204,10 @@ class Editable(Generic[Edited]):
         return self._edited("point", path=path, point=point, by=by, follow=follow or None)
 
     def removed(self) -> Edited:
-        """Removes the layer, so that what it hid shows."""
+        """Removes the layer, so that what it hid shows.
+
+        Its pixels stay in the file until the picture is purged; see `EditableImage.purged`.
+        """
         return self._edited("remove")
 
     def cut(
@@ -208,40 +320,3 @@ class Editable(Generic[Edited]):
     def with_parent(self, parent: str | int | None) -> Edited:
         """Lets the layer follow another layer, by name or position, or a group; None for none."""
         return self._edited("parent", to="" if parent is None else parent)
-
-
-class Insertable(Generic[Edited]):
-    """Methods of a picture that return a new image with one more layer."""
-
-    __slots__ = ()
-
-    def edited(self, *operations: Mapping[str, Any]) -> Edited:
-        """Image after operations."""
-        raise NotImplementedError  # only subclasses know the picture
-
-    def inserted(
-        self,
-        source: str,
-        layer: str | int | None = None,
-        *,
-        at: Pair | None = None,
-        over: str | int | None = None,
-        under: str | int | None = None,
-        name: str | None = None,
-        effort: int | None = None,
-    ) -> Edited:
-        """Inserts a layer of another `.pxi` file, which is not encoded anew, or a picture file.
-
-        Args:
-            source: Name of the file.
-            layer: Name or position of a layer of a `.pxi` file; its front layer by default.
-            at: Canvas point for its centre; by default that in its own file if both pictures have
-                the same size, otherwise the middle of the canvas.
-            over: Name or position of the layer that it lies just in front of.
-            under: Name or position of the layer that it lies just behind.
-            name: Name of the new layer.
-            effort: How hard the encoder tries with a picture file, 1..9; by default 2.
-        """
-        given = {"source": source, "from_layer": layer, "at": at, "over": over, "under": under,
-                 "name": name, "effort": effort}  # fmt: skip
-        return self.edited({"op": "insert", **{k: v for k, v in given.items() if v is not None}})

@@ -59,6 +59,18 @@ class Planes:
         return stored
 
     @property
+    def stored(self) -> NDArray[np.bool_]:
+        """Samples in cells that have latents, bool [rows, columns].
+
+        Raises:
+            FormatError: The stream is corrupt.
+        """
+        side, (columns, rows) = 1 << self.packed["cell"], self.size
+        if not self.packed["support"]:
+            return np.ones((rows, columns), bool)
+        return self.support.repeat(side, 0)[:rows].repeat(side, 1)[:, :columns]
+
+    @property
     def latents(self) -> Latents:
         """Latents; decoded again at each call, because only the raster is kept in memory.
 

@@ -6,6 +6,7 @@ import pytest
 
 import proxyimg_codec as pxi
 from proxyimg_codec.io import raster
+from tests.support import hidden
 from tests.support.edits import FLAGS
 
 
@@ -243,3 +244,21 @@ def test_what_a_drawn_picture_cannot_hold_is_said_by_the_tool_that_was_called(to
     ran = tool("edit", tmp_path / "a.pxi", tmp_path / "a.ppm", "--opacity", "0", "1")
     assert "pxi-edit: warning: " in ran.err
     assert "pxi-decode" not in ran.err
+
+
+def test_purge_and_who_says_what_stays(tool, tmp_path):
+    files = tmp_path / "in.pxi", tmp_path / "out.pxi", tmp_path / "purged.pxi"
+    image = hidden.encoded("blue")
+    image.save(files[0])
+    stays = "pxi-edit: pixels that no layer shows any more stay in the file; --purge takes them out"
+    assert stays in tool("edit", *files[:2], "--remove", "disc").err
+    assert stays not in tool("edit", *files[:2], "--remove", "disc", "--force", "--quiet").err
+    assert stays not in tool("edit", *files[:2], "--move", "disc", "3,4", "--force").err
+    tool("edit", *files[:2], "--remove", "disc", "--force")
+    said = tool("edit", *files[1:], "--purge", "-e", "1").err
+    assert "samples that no layer shows, and the history of 1 edits" in said
+    assert stays not in said
+    assert files[2].read_bytes() == image.layers["disc"].removed().purged(1).to_bytes()
+    assert "purged 0 samples" in tool("edit", *files[:2], "--purge", "--force").err
+    assert files[1].read_bytes() == files[0].read_bytes()
+    assert "OUT is missing" in tool("edit", files[0], "--purge", "--list", code=2).err

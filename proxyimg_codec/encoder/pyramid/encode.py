@@ -106,7 +106,7 @@ def encode(
         The planes, and whether refinement ran to its end.
     """
     model = load(NUMBER)
-    job = _Job(model, raster, step)
+    job = Job(model, raster, step)
     complete = True
     random = torch.Generator().manual_seed(seed)  # that of torch belongs to the whole process
     try:
@@ -117,7 +117,7 @@ def encode(
     return job.planes(), complete
 
 
-class _Job:
+class Job:
     """Latents of a raster that are being refined.
 
     Attributes:
@@ -129,15 +129,21 @@ class _Job:
         shifts: Shifts of the scale index.
         grid: Sizes of the planes.
         count: Number of levels.
+
+    Args:
+        model: The model.
+        raster: The raster.
+        step: Index s of the quantization step 2**(s / 64).
+        grid: Sizes of the planes; by default those of a new raster.
     """
 
-    def __init__(self, model: Model, raster: Raster, step: int) -> None:
+    def __init__(self, model: Model, raster: Raster, step: int, grid: Grid | None = None) -> None:
         self.model, self.raster, self.step_index = model, raster, step
         self.step = torch.tensor([2.0 ** (step / 64)])
-        self.grid = Grid(raster.size, levels_for(raster.size))
+        self.grid = grid or Grid(raster.size, levels_for(raster.size))
         self.count = self.grid.levels
-        self.picture = _tensor(raster.samples.transpose(2, 0, 1))
-        self.weight = None if raster.weight is None else _tensor(raster.weight[None])
+        self.picture = tensor(raster.samples.transpose(2, 0, 1))
+        self.weight = None if raster.weight is None else tensor(raster.weight[None])
         self.support = self._support()
         self.latents = self._analysed()
         self.shifts = self._shifts()
@@ -152,24 +158,31 @@ class _Job:
         for level in range(1, self.count + 1):
             mask = by_channel(self.grid.bands(cells, CELL, level))
             mask[3:] &= not r.grey
-            masks.append(_tensor(mask.astype(np.float32)))
+            masks.append(tensor(mask.astype(np.float32)))
         lowest = np.ones((3, *mask.shape[1:]), np.float32)
         lowest[1:] *= not r.grey
-        return [*masks, _tensor(lowest)]
+        return [*masks, tensor(lowest)]
+
+    def _analysed(self) -> list[Tensor]:
+        """Latents to begin with, not rounded."""
+        return self.supported(refine.shrunk(self.analysis(self.picture), refine.DEAD_ZONE))
+
+    def supported(self, latents: list[Tensor]) -> list[Tensor]:
+        """Latents with 0 where they must be 0."""
+        if self.support is None:
+            return latents
+        return [y * mask for y, mask in zip(latents, self.support, strict=True)]
 
     @torch.no_grad()
-    def _analysed(self) -> list[Tensor]:
-        """Latents by the analysis, window by window."""
+    def analysis(self, picture: Tensor) -> list[Tensor]:
+        """Analysis of samples [1, 3, rows, columns], window by window."""
         shapes = [self.grid.at(level) for level in self._depths()]
         found = [torch.zeros(1, 9, *shape) for shape in shapes[:-1]]
         found.append(torch.zeros(1, 3, *shapes[-1]))
         for box in self.windows(REACH):
-            part = self.picture[:, :, box.outer[0], box.outer[1]]
-            own = refine.shrunk(self.model.analyse(part, self.step, self.count), refine.DEAD_ZONE)
-            self._keep(box, found, own)
-        if self.support is None:
-            return found
-        return [y * mask for y, mask in zip(found, self.support, strict=True)]
+            part = picture[:, :, box.outer[0], box.outer[1]]
+            self._keep(box, found, self.model.analyse(part, self.step, self.count))
+        return found
 
     def _depths(self) -> list[int]:
         """Level of each array of latents; the lowest planes have the size of the last level."""
@@ -266,7 +279,7 @@ class _Job:
         return tuple(best_shift(part) for part in samples)
 
 
-def _tensor(values: NDArray[np.floating]) -> Tensor:
+def tensor(values: NDArray[np.floating]) -> Tensor:
     """Tensor float32 [1, C, H, W] of an array [C, H, W], with channels last in memory."""
     whole = torch.from_numpy(np.ascontiguousarray(values, np.float32))[None]
     return whole.contiguous(memory_format=torch.channels_last)

@@ -42,6 +42,7 @@ class Target(NamedTuple):
             on; None = 0.
         similarity: Weight of 1 - MS-SSIM, in squares of the step, as the error; None to use the
             squared error instead.
+        price: Error that a bit is worth, in squares of the step.
     """
 
     picture: Tensor
@@ -51,6 +52,7 @@ class Target(NamedTuple):
     step: Tensor
     shifts: Sequence[int] | None = None
     similarity: float | None = None
+    price: float = RATE_WEIGHT
 
 
 MOVING = 0.35
@@ -102,16 +104,18 @@ class Cost(NamedTuple):
         error: [B] squared errors in squares of the step.
         spent: [B] bits, without those of the lowest planes.
         likely: Distributions of the latents of levels 1, 2, ...
+        price: Error that a bit is worth, in squares of the step.
     """
 
     error: Tensor
     spent: Tensor
     likely: list[Likelihood]
+    price: float
 
     @property
     def total(self) -> Tensor:
-        """Error plus `RATE_WEIGHT` times bits, summed over the pictures."""
-        return (self.error + RATE_WEIGHT * self.spent).sum()
+        """Error plus `price` times bits, summed over the pictures."""
+        return (self.error + self.price * self.spent).sum()
 
 
 def cost(model: Model, target: Target, latents: Sequence[Tensor], smooth: bool = True) -> Cost:
@@ -134,11 +138,11 @@ def cost(model: Model, target: Target, latents: Sequence[Tensor], smooth: bool =
     if target.similarity is not None:
         weight = 1.0 if target.weight is None else target.weight
         alike = ms_ssim(shown * weight, target.picture * weight)
-        return Cost(target.similarity * (1 - alike), spent, likely)
+        return Cost(target.similarity * (1 - alike), spent, likely, target.price)
     error = (shown - target.picture) ** 2
     if target.weight is not None:
         error = error * target.weight
-    return Cost(sums(error) / target.step**2, spent, likely)
+    return Cost(sums(error) / target.step**2, spent, likely, target.price)
 
 
 def sums(x: Tensor) -> Tensor:
@@ -229,7 +233,9 @@ def improved(
             break
         slopes = torch.autograd.grad(total, ys)
         # The analysis rounds the lowest planes one by one, which a smooth border may show.
-        found = moved(model, target.step, now, spent.likely, slopes, random, turn == 0)
+        found = moved(
+            model, target.step, now, spent.likely, slopes, random, turn == 0, target.price
+        )
         now = held(found, first, target)
         tick()
     return best
@@ -238,7 +244,7 @@ def improved(
 @torch.no_grad()
 def moved(
     model: Model, step: Tensor, latents: Sequence[Tensor], likely: Sequence[Likelihood],
-    slopes: Sequence[Tensor], random: torch.Generator, settle: bool,
+    slopes: Sequence[Tensor], random: torch.Generator, settle: bool, price: float = RATE_WEIGHT,
 ) -> list[Tensor]:  # fmt: skip
     """Makes one round of moves of integer latents by one.
 
@@ -254,15 +260,16 @@ def moved(
         slopes: Derivatives of the total cost by the latents.
         random: Generator that chooses the latents that move.
         settle: Whether the lowest planes move too, whose values all count as equally cheap.
+        price: Error that a bit is worth, in squares of the step.
     """
     out = list(latents)
     for k, p in enumerate(likely):
         y = latents[k]
         own = around(y, *p)
-        outer = slopes[k] - RATE_WEIGHT * own.slope
+        outer = slopes[k] - price * own.slope
         bend = model.level(k + 1).gains_at(step) ** 2
-        down = bend - outer + RATE_WEIGHT * (own.below - own.here)
-        up = bend + outer + RATE_WEIGHT * (own.above - own.here)
+        down = bend - outer + price * (own.below - own.here)
+        up = bend + outer + price * (own.above - own.here)
         change = torch.where(up < down, 1.0, -1.0)
         gains = torch.minimum(up, down) < -1e-3
         out[k] = y + change * (gains & (torch.rand(y.shape, generator=random) < MOVING))

@@ -130,7 +130,7 @@ def test_refinement_lowers_the_cost():
 
 
 def test_shifts_take_the_fewest_bits():
-    job = pyramid._Job(load(1), Raster(textured(96, 96, 3).astype(np.float32)), 256)
+    job = pyramid.Job(load(1), Raster(textured(96, 96, 3).astype(np.float32)), 256)
     best = job._shifts()
     likely = job.model.likelihoods([torch.round(y) for y in job.latents], job.step)
     few = slice(None, None, pyramid.SPARSE)
