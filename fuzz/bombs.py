@@ -457,16 +457,17 @@ def masks() -> bytes:
 @bomb
 def sources() -> bytes:
     """References of as many cells as are allowed, each of one sample that shows nowhere."""
-    side, masked = 2048, {"cell": 6, "mask": lonely(32, 32)}
-    copied = view(side, side, offsets=[1, 1] * 16, sources=_ones(2, side, side), **masked)
-    return made([layer()], [copied], planes=(plan(side, side),))
+    width, height = 2048, 2040
+    masked: Values = {"cell": 6, "mask": lonely(32, 32), "offsets": [1, 1] * 16}
+    copied = view(width, height, sources=_ones(2, height, width), **masked)
+    return made([layer()], [copied], planes=(plan(width, height),))
 
 
 @bomb
 def copies() -> bytes:
     """View of as many samples as are allowed, most of them copied; another raster behind it."""
     width, height = 4096, 2048
-    masked = {"cell": 6, "mask": lonely(32, 64), "behind": 2}
+    masked: Values = {"cell": 6, "mask": lonely(32, 64), "behind": 2}
     copied = view(width, height, grain=6, offsets=[64, 0], sources=_ones(1, 32, 64), **masked)
     behind = plan(width, height) | {"cell": 7, "support": _halves(16, 32)}
     return made([layer()], [copied], planes=(plan(width, height), behind))

@@ -176,3 +176,14 @@ def test_errors_name_the_file(content, name, tool, small_pxi, tmp_path, monkeypa
     place = "standard input" if name == "-" else name
     assert err.startswith(f"pxi-info: {place}: ")
     assert err.count(place) == 1
+
+
+def test_what_lies_behind(tool):
+    """Planes of a view's own, and references."""
+    file = ROOT / "conformance/cases/behind/copies-behind/input.pxi"
+    back, disc = json.loads(tool("info", file, "--json").out)["layers"]
+    assert (back["behind"], back["behind_alpha"], back["offsets"], back["grain"]) == (2, 3, 5, 1)
+    assert (disc["behind"], disc["offsets"]) == (None, 0)
+    assert back["texture_bytes"] > 0
+    out = tool("info", file).out.decode()
+    assert ", planes 2 behind with alpha of planes 3, 5 offsets for cells of 2 samples" in out
