@@ -29,6 +29,9 @@ from .places import (
 if TYPE_CHECKING:
     from ..model import Picture
 
+ENCODED = ("texture", "insert")
+"""Operations that may encode a picture file."""
+
 
 def arguments() -> argparse.ArgumentParser:
     """Parser of the command line; its result has a list `edits` in the order of the flags."""
@@ -48,7 +51,7 @@ def arguments() -> argparse.ArgumentParser:
         "--effort",
         type=int,
         metavar="1-9",
-        help="how long to optimize what is encoded: pictures as textures; default 2",
+        help="how long to optimize pictures that become textures or layers; default 2",
     )
     p.add_argument("--bake", action="store_true", help="forget the history of edits")
     p.add_argument("--purge", action="store_true", help="after all edits, take out pixels that no "
@@ -80,7 +83,7 @@ def edit_file(args: argparse.Namespace) -> None:
     operations = [edit.values() for edit in args.edits]
     _check(args, operations)
     if args.effort is not None:
-        operations = [v | {"effort": args.effort} if v.get("op") == "texture" else v
+        operations = [v | {"effort": args.effort} if v.get("op") in ENCODED else v
                       for v in operations]  # fmt: skip
 
     from ..codec.read import from_file
@@ -172,9 +175,10 @@ def _check(args: argparse.Namespace, operations: Sequence[Values]) -> None:
 
 
 def _files_of(args: argparse.Namespace, operations: Sequence[Values]) -> list[str]:
-    """Files that edits read: scripts, and the sources of textures and outlines."""
+    """Files that edits read: scripts, masks, and the sources of textures and outlines."""
     edits = [edit for values in operations for edit in values.get("script", [values])]
-    sources = [edit.get("source") for edit in edits if isinstance(edit, Mapping)]
+    read = ("source", "mask")
+    sources = [edit.get(key) for edit in edits if isinstance(edit, Mapping) for key in read]
     scripts = [edit.words[0] for edit in args.edits if edit.flag == "--script"]
     return [*scripts, *(v for v in sources if isinstance(v, str) and "\0" not in v)]
 

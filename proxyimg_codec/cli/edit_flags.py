@@ -85,6 +85,23 @@ def add_edits(p: argparse.ArgumentParser) -> None:
     group = p.add_argument_group("edits")
     for flag in FLAGS:
         flag.add(group)
+    group.add_argument(
+        "--follow",
+        action=_Follow,
+        nargs=0,
+        default=argparse.SUPPRESS,
+        help="after --point: its inside goes along, the rest of the outline stays",
+    )
+
+
+class _Follow(argparse.Action):
+    """Adds `follow` to the `--point` before it."""
+
+    def __call__(self, parser: Any, space: Any, values: Any, option: Any = None) -> None:
+        if not space.edits or space.edits[-1].flag != "--point":
+            parser.error("--follow belongs right after a --point and its words")
+        *before, last = space.edits
+        space.edits = [*before, last._replace(parse=_point_followed)]
 
 
 def guarded(words: Sequence[str]) -> list[str]:
@@ -153,6 +170,10 @@ def _point(layer: str, which: str, by: str) -> Values:
     }  # fmt: skip
 
 
+def _point_followed(layer: str, which: str, by: str) -> Values:
+    return {**_point(layer, which, by), "follow": True}
+
+
 def _named(op: str) -> Callable[[str], Values]:
     """Function that parses NAME for operation `op`."""
     return lambda layer: {"op": op, "layer": key(layer)}
@@ -181,15 +202,37 @@ def _order(layer: str, place: str) -> Values:
 
 
 def _texture(text: str) -> Values:
-    layer, given, source = text.partition("=")
+    target, given, source = text.partition("=")
     if not given or not source:
         raise ValueError
-    values: Values = {"op": "texture", "layer": key(layer)}
+    values: Values = {"op": "texture", "layer": key(target)}
     if source.endswith("@shape"):
         source, values["fit"] = source.removesuffix("@shape"), "shape"
-    if parts := re.fullmatch(r"(.+?\.pxi):(.+)", source, re.IGNORECASE):
-        return {**values, "source": parts[1], "from_layer": key(parts[2])}
-    return {**values, "source": key(source)}
+    file, layer = _foreign(source)
+    return {**values, "source": file or key(source), **layer}
+
+
+def _foreign(source: str) -> tuple[str, Values]:
+    """Splits FILE.pxi:LAYER into the file, or nothing, and the parameter `from_layer`."""
+    parts = re.fullmatch(r"(.+?\.pxi):(.+)", source, re.IGNORECASE)
+    return (parts[1], {"from_layer": key(parts[2])}) if parts else ("", {})
+
+
+def _insert(text: str) -> Values:
+    values: Values = {"op": "insert"}
+    beside, given, source = text.partition("=")
+    if given:
+        side = "under" if beside.startswith("under:") else "over"
+        values[side] = key(beside.removeprefix("under:"))
+    else:
+        source = text
+    start, at, place = source.rpartition("@")
+    if at and re.fullmatch(r"[-+.,\deE]+", place):
+        source, values["at"] = start, _floats(place, 2)
+    if not source:
+        raise ValueError
+    file, layer = _foreign(source)
+    return {**values, "source": file or source, **layer}
 
 
 def _recolour(layer: str, changes: str) -> Values:
@@ -201,6 +244,28 @@ def _recolour(layer: str, changes: str) -> Values:
         else:
             values["tint"] = name
     return values
+
+
+def _cut(text: str) -> Values:
+    layer, given, mask = text.partition("=")
+    if given:
+        if not mask:
+            raise ValueError
+        return {"op": "cut", "layer": key(layer), "mask": mask}
+    layer, *places = text.split("@")
+    if not places:
+        raise ValueError
+    points = [_floats(place.removeprefix("!"), 2) for place in places]
+    said = [place.startswith("!") for place in places]
+    values: Values = {"op": "cut", "layer": key(layer)}
+    for name, out in (("points", False), ("outside", True)):
+        some = [point for point, no in zip(points, said, strict=True) if no is out]
+        values |= {name: some} if some else {}
+    return values
+
+
+def _merge(layer: str, other: str) -> Values:
+    return {"op": "merge", "layer": key(layer), "other": key(other)}
 
 
 def _group(text: str) -> Values:
@@ -249,6 +314,13 @@ FLAGS = (
     Flag("--outlines", _outlines, ["FILE.svg"], "take boundaries from an SVG, by layer name"),
     Flag("--remove", _named("remove"), ["NAME"], "take away: what it hid shows"),
     Flag("--duplicate", _assigned("duplicate", "name"), ["NAME[=COPY]"], "copy"),
+    Flag("--cut", _cut, ["NAME=MASK|NAME@X,Y"],
+        "make a layer out of a part: what a mask holds, or what is found at points, "
+        "more with @X,Y, outside of it @!X,Y"),
+    Flag("--merge", _merge, ["NAME", "OTHER"], "make one layer of two that show the same planes"),
+    Flag("--insert", _insert, ["[NAME=]SOURCE[@X,Y]"],
+        "a layer of another file (FILE.pxi:LAYER) or a cut-out picture, in front of all or NAME, "
+        "or behind under:NAME; its centre at X,Y"),
     Flag("--rename", _assigned("rename", "name"), ["NAME=NEW"], "give another name"),
     Flag("--order", _order, ["NAME", "PLACE"],
         "front, back, forward, backward, or a position from the back"),

@@ -164,8 +164,8 @@ def texture(
         home, origin = picture, layer_named(picture, source)
         shown = origin.texture
     else:
-        home, origin = _loaded(source, from_layer, effort)
-        shown = _brought(picture, home, origin, networks)
+        home, origin = loaded(source, from_layer, effort)
+        shown = brought(picture, home, origin, networks)
     if isinstance(shown, PyramidTexture) and shown.cuts is not None and origin is not target:
         shown = shown.masked(shown.cuts.everything)
     if origin.sampling and fit == "shape":
@@ -185,7 +185,7 @@ def texture(
     return changed(picture, layers, networks=networks)
 
 
-def _brought(picture: Picture, home: Picture, origin: Layer, networks: list[Network]) -> Texture:
+def brought(picture: Picture, home: Picture, origin: Layer, networks: list[Network]) -> Texture:
     """Texture of layer `origin` of picture `home`, in a form that `picture` can use.
 
     Planes are taken as a whole, including the parts that other layers of their file show. A network
@@ -212,7 +212,7 @@ def _brought(picture: Picture, home: Picture, origin: Layer, networks: list[Netw
     return replace(texture, network=number)
 
 
-def _loaded(source: str, name: str | int | None, effort: int) -> tuple[Picture, Layer]:
+def loaded(source: str, name: str | int | None, effort: int) -> tuple[Picture, Layer]:
     """Reads a `.pxi` file and chooses a layer of it, or encodes a picture file as one layer.
 
     A boundary that the picture gets, since it is clear outside, cuts the texture of the layer.

@@ -50,6 +50,33 @@ class EditableImage:
 
         return self._with(apply(self.picture, operations))
 
+    def inserted(
+        self,
+        source: str,
+        layer: str | int | None = None,
+        *,
+        at: Pair | None = None,
+        over: str | int | None = None,
+        under: str | int | None = None,
+        name: str | None = None,
+        effort: int | None = None,
+    ) -> Self:
+        """Inserts a layer of another `.pxi` file, which is not encoded anew, or a picture file.
+
+        Args:
+            source: Name of the file.
+            layer: Name or position of a layer of a `.pxi` file; its front layer by default.
+            at: Canvas point for its centre; by default that in its own file if both pictures have
+                the same size, otherwise the middle of the canvas.
+            over: Name or position of the layer that it lies just in front of.
+            under: Name or position of the layer that it lies just behind.
+            name: Name of the new layer.
+            effort: How hard the encoder tries with a picture file, 1..9; by default 2.
+        """
+        given = {"source": source, "from_layer": layer, "at": at, "over": over, "under": under,
+                 "name": name, "effort": effort}  # fmt: skip
+        return self.edited({"op": "insert", **{k: v for k, v in given.items() if v is not None}})
+
     def undone(self, steps: int = 1) -> Self:
         """Returns the picture as it was before its last `steps` edits.
 
@@ -160,7 +187,9 @@ class Editable(Generic[Edited]):
         """
         return self._edited("drag", handles=[[*p, *v] for p, v in handles.items()])
 
-    def with_point(self, path: int, point: int, dx: float, dy: float) -> Edited:
+    def with_point(
+        self, path: int, point: int, dx: float, dy: float, *, follow: bool = False
+    ) -> Edited:
         """Moves one control point of the boundary; texture appears or disappears there.
 
         Args:
@@ -168,8 +197,11 @@ class Editable(Generic[Edited]):
             point: Number of the control point in the path, from 0.
             dx: Distance to the right.
             dy: Distance down.
+            follow: Whether the proxy nodes, and so the texture, go along instead; the rest of the
+                outline stays.
         """
-        return self._edited("point", path=path, point=point, by=[dx, dy])
+        by = [dx, dy]
+        return self._edited("point", path=path, point=point, by=by, follow=follow or None)
 
     def removed(self) -> Edited:
         """Removes the layer, so that what it hid shows.
@@ -177,6 +209,33 @@ class Editable(Generic[Edited]):
         Its pixels stay in the file until the picture is purged; see `EditableImage.purged`.
         """
         return self._edited("remove")
+
+    def cut(
+        self,
+        mask: str | None = None,
+        *,
+        points: Sequence[Pair] | None = None,
+        outside: Sequence[Pair] | None = None,
+        name: str | None = None,
+    ) -> Edited:
+        """Makes a new layer, just in front, out of a part of the layer; nothing is encoded anew.
+
+        Args:
+            mask: Name of a file with a mask of the canvas.
+            points: Instead of a mask, canvas points inside of what is to be found.
+            outside: Canvas points outside of it.
+            name: Name of the new layer; by default that of the mask file.
+        """
+        given = {"mask": mask, "points": points, "outside": outside, "name": name}
+        return self._edited("cut", **given)
+
+    def merged(self, other: str | int) -> Edited:
+        """Makes one layer of this one and another that shows the same planes; nothing is encoded.
+
+        Args:
+            other: Name or position of the other layer.
+        """
+        return self._edited("merge", other=other)
 
     def duplicated(self, name: str | None = None) -> Edited:
         """Puts a copy in front of the layer, which shares its texture."""

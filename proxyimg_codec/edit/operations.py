@@ -47,6 +47,7 @@ KINDS: dict[str, dict[str, Any]] = {
     "integer": {"type": "integer"},
     "place": {"type": ["integer", "string"]},
     "pair": _numbers(2),
+    "pairs": {"type": "array", "items": _numbers(2), "minItems": 1, "maxItems": HANDLES_MAX},
     "matrix": _numbers(6),
     "colours": _numbers(12),
     "handles": {
@@ -56,6 +57,7 @@ KINDS: dict[str, dict[str, Any]] = {
         "maxItems": HANDLES_MAX,
     },
     "text": {"type": "string", "pattern": r"^[^\0]*$"},
+    "flag": {"type": "boolean"},
     "axis": {"enum": ["horizontal", "vertical"]},
     "fit": {"enum": ["box", "shape"]},
     "colour": {"type": "string", "pattern": "^#[0-9a-fA-F]{6}$"},

@@ -123,7 +123,7 @@ def group(picture: Picture, layers: Sequence[str | int], name: str) -> Picture:
             groups[str(each)] = name
     new = [replace(v, parent=name) if v.name in inner else v for v in picture.layers]
     result = changed(picture, new, groups=groups)
-    _check_acyclic(result, "group")
+    check_acyclic(result, "group")
     return result
 
 
@@ -146,11 +146,11 @@ def parent(picture: Picture, layer: str | int, to: str) -> Picture:
         result = changed(picture, list(picture.layers), groups=groups)
     else:
         result = substituted(picture, [replace(layer_named(picture, layer), parent=above)])
-    _check_acyclic(result, "parent")
+    check_acyclic(result, "parent")
     return result
 
 
-def _check_acyclic(picture: Picture, what: str) -> None:
+def check_acyclic(picture: Picture, what: str) -> None:
     """Refuses a tree in which a group or layer is part of itself.
 
     Raises:

@@ -15,6 +15,7 @@ from ..geometry import mesher
 from ..geometry.boundary import COORDINATE_MAX, Boundary
 from ..geometry.mesh import FRACTION_BITS
 from ..geometry.pose import NODE_BITS, NODE_MAX, Matrix, Pose, fixed, inverse, product
+from ..geometry.warp import WEIGHT_BITS, barycentric
 from ..io.files import read_bytes
 from ..model import Layer, Picture
 from ..render.neighbours import present_outline
@@ -23,6 +24,9 @@ from .operations import layer_named, members, operation, substituted
 
 REST_UNIT = 6
 """Unit of boundaries that are mapped from the present place of a layer back to rest."""
+
+PINS_MAX = 120
+"""Most points of an outline that are held when a control point takes the inside along."""
 
 BESIDE = 1.0
 """Distance from a mesh in pixels up to which a point counts as on its layer."""
@@ -186,7 +190,7 @@ def drag(picture: Picture, layer: str | int, handles: Sequence[Sequence[float]])
     rest = pose.apply(refined.nodes) / _SCALE
     moved = deform.drag(present, refined.faces, values[:, :2], values[:, :2] + values[:, 2:], rest)
     _warn_of_points_outside(chosen, values, deform.distances(present, refined.faces, values[:, :2]))
-    return substituted(picture, [replace(chosen, pose=_bent(chosen, moved))])
+    return substituted(picture, [replace(chosen, pose=_bent(chosen, moved, "drag"))])
 
 
 def _warn_of_points_outside(
@@ -203,8 +207,10 @@ def _warn_of_points_outside(
         )  # fmt: skip
 
 
-def _bent(layer: Layer, present: NDArray[np.float64]) -> Pose:
+def _bent(layer: Layer, present: NDArray[np.float64], what: str) -> Pose:
     """Pose that brings the nodes of a layer to present positions float64 [N, 2] in pixels.
+
+    `what` is the name of the operation in error messages.
 
     Raises:
         UsageError: A displacement would be out of range.
@@ -217,32 +223,88 @@ def _bent(layer: Layer, present: NDArray[np.float64]) -> Pose:
     away = back - layer.mesh.refined.nodes / _SCALE
     nodes = np.rint(away * (1 << NODE_BITS))
     if not (np.abs(nodes) < NODE_MAX).all():
-        raise UsageError(f"drag: layer {layer.name!r} would leave the range of coordinates")
+        raise UsageError(f"{what}: layer {layer.name!r} would leave the range of coordinates")
     return replace(pose, nodes=nodes.astype(np.int64) if nodes.any() else None)
 
 
 @operation("point", layer="layer: a layer's name or position",
            path="integer: a path of the boundary, counted from 0",
            point="integer: a control point of the path, counted from 0",
-           by="pair: dx, dy in canvas pixels")  # fmt: skip
-def point(picture: Picture, layer: str | int, path: int, point: int, by: Pair) -> Picture:
-    """Moves one control point of a boundary, in steps of the boundary's unit."""
+           by="pair: dx, dy in canvas pixels",
+           follow="flag?: whether the inside goes along, as if it were dragged there")  # fmt: skip
+def point(
+    picture: Picture, layer: str | int, path: int, point: int, by: Pair, follow: bool = False
+) -> Picture:
+    """Moves one control point of a boundary; the inside may follow.
+
+    Without `follow` the point moves in steps of the boundary's unit, and texture appears or
+    disappears there. With it the layer is bent: the proxy nodes, and so the texture, follow the
+    point as rigidly as possible, while the rest of the outline stays.
+
+    Raises:
+        UsageError: There is no such point, or something would leave the range of coordinates.
+    """
     chosen = layer_named(picture, layer)
     shape = chosen.boundary
     if shape is None:
         raise UsageError(f"point: layer {chosen.name!r} has no boundary")
     if not 0 <= path < len(shape.paths):
         raise UsageError(f"point: layer {chosen.name!r} has paths 0..{len(shape.paths) - 1}")
-    points = shape.paths[path].copy()
+    points = shape.paths[path]
     if not 0 <= point < len(points):
         raise UsageError(f"point: path {path} has control points 0..{len(points) - 1}")
+
+    def shaped(step: NDArray[np.int64]) -> Boundary:
+        paths = list(shape.paths)
+        paths[path] = points.copy()
+        paths[path][point] += step
+        return Boundary(shape.unit, tuple(paths))
+
+    if follow:
+        new = _followed(meshed(picture, chosen), shaped(np.array([1, 0])), by)
+        return substituted(picture, [new])
     a, b, c, d, _, _ = inverse(chosen.pose.floats)
     step = np.array([a * by[0] + c * by[1], b * by[0] + d * by[1]]) * (1 << shape.unit)
     if not (np.abs(points[point] + step) < COORDINATE_MAX).all():
         raise UsageError("point: the control point would leave the range of coordinates")
-    points[point] += np.rint(step).astype(np.int64)
-    paths = (*shape.paths[:path], points, *shape.paths[path + 1 :])
-    return substituted(picture, [replace(chosen, boundary=Boundary(shape.unit, paths))])
+    boundary = shaped(np.rint(step).astype(np.int64))
+    return substituted(picture, [replace(chosen, boundary=boundary)])
+
+
+def _followed(layer: Layer, moved: Boundary, by: Pair) -> Layer:
+    """Bends a layer with a mesh so that its outline takes a shape, and the inside goes along.
+
+    Points along the outline are the handles. Those in triangles that have a node in common with
+    that of the point which moves most go along freely, since that one is to arrive.
+
+    Args:
+        layer: The layer, with a mesh.
+        moved: Its boundary with one control point moved by (1, 0) in its unit.
+        by: How far this point is to move, dx, dy in canvas pixels.
+    """
+    assert layer.boundary is not None, "it has a control point"
+    assert layer.mesh is not None, "`meshed` gives it one"
+    refined, pose = layer.mesh.refined, layer.pose
+    rest = sampled(layer.boundary)
+    share = (sampled(moved) - rest)[:, 0] * (1 << moved.unit)
+    face, weights = barycentric(
+        np.rint(rest * _SCALE).astype(np.int64), refined.nodes, refined.faces
+    )
+    corners = refined.faces[face]
+    now = pose.present(refined) / _SCALE
+    places = (weights[..., None] * now[corners]).sum(1) / (1 << WEIGHT_BITS)
+    first = int(share.argmax())
+    away = np.hypot(*(places - places[first]).T)
+    held = ~np.isin(corners, corners[first]).any(1)
+    if not held.any():  # in so coarse a mesh all that can stay is what is farthest away
+        held = away == away.max()
+    still = np.flatnonzero(held & (share == 0))
+    still = still[:: max(-(-len(still) // PINS_MAX), 1)]
+    handles = np.array([first, *np.flatnonzero(held & (share > 0)), *still])
+    targets = places[handles] + share[handles, None] * np.array(by)
+    base = pose.apply(refined.nodes) / _SCALE
+    bent = deform.drag(now, refined.faces, places[handles], targets, base)
+    return replace(layer, pose=_bent(layer, bent, "point"))
 
 
 @operation("outlines", source="text: the name of an SVG file, whose paths name layers")

@@ -56,7 +56,7 @@ def outline(
     if not pose.affine and not pose.displaced:
         return boundary
     if boundary is None:
-        boundary = _rectangle(size)
+        boundary = rectangle(size)
     if not pose.displaced:
         up = FRACTION_BITS - boundary.unit
         return Boundary(FRACTION_BITS, tuple(pose.apply(p << up) for p in boundary.paths))
@@ -68,7 +68,7 @@ def outline(
 
 
 @functools.lru_cache(maxsize=64)
-def _rectangle(size: tuple[int, int]) -> Boundary:
+def rectangle(size: tuple[int, int]) -> Boundary:
     """Canvas as a path of four straight segments, whose inner control points are its corners."""
     w, h = size
     corners = np.array([[0, 0], [w, 0], [w, h], [0, h]], np.int64)

@@ -49,8 +49,10 @@ class Behind(Base):
 
 
 def _sources(value: Any, count: int = 1, bits: int = 2) -> bytes:
-    """Coded array of the cells of the disc that all have a value."""
-    return arrays.encode(np.full((count, 6, 8), value), bits, np.ones((6, 8), bool))
+    """Coded array of the cells of the disc that have a value, but for the first, which is 0."""
+    values = np.full((count, 6, 8), value)
+    values[:, 0, 0] = 0
+    return arrays.encode(values, bits, np.ones((6, 8), bool))
 
 
 def _alone(b: Base) -> bytes:

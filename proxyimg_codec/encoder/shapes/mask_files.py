@@ -88,13 +88,37 @@ def load_masks(path: str | Path, width: int, height: int) -> list[Region]:
         raise InputError(f"{path}: the mask folder holds no picture; put one mask a layer in it")
     check_count(len(files), f"masks in {path}")
     for name, place in files:
-        content, what = _read(place, width, height).content, f"{place}: the mask"
-        values = content if isinstance(content, np.ndarray) else _mask(content)
-        mask, several = inside(values, what)
+        mask, several = _region(place, width, height)
         regions.append(Region(name, mask))
         soft += [str(place)] * several
     warn_of_soft(soft)
     return regions
+
+
+def load_mask(path: str | Path, width: int, height: int) -> NDArray[np.bool_]:
+    """Reads one mask, as `load_masks` does those of a folder.
+
+    Args:
+        path: Picture file or NPY file.
+        width: Width of the picture in pixels.
+        height: Height of the picture in pixels.
+
+    Returns:
+        bool [height, width], True inside.
+
+    Raises:
+        InputError: The file cannot be read, has the wrong size or several pictures, or is faint.
+    """
+    mask, soft = _region(Path(path), width, height)
+    warn_of_soft([str(path)] * soft)
+    return mask
+
+
+def _region(file: Path, width: int, height: int) -> tuple[NDArray[np.bool_], bool]:
+    """Inside of the mask in a file, bool [height, width], and whether it is soft."""
+    content = _read(file, width, height).content
+    values = content if isinstance(content, np.ndarray) else _mask(content)
+    return inside(values, f"{file}: the mask")
 
 
 def _mask_files(folder: Path, above: str = "") -> list[tuple[str, Path]]:
