@@ -121,7 +121,7 @@ class PictureHandle(Handle):
 
     @property
     def planes(self) -> tuple[Planes, ...]:
-        """Planes of all rasters that pyramid textures show, in the order of their first use."""
+        """Planes of all rasters that pyramid textures show, in the order of the file."""
         return self._picture.planes
 
 
