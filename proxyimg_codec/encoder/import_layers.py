@@ -24,7 +24,7 @@ from ..texture.implicit import Box, ImplicitTexture
 from ..texture.network import Floats, NetShape, Network
 from .encode import Progress, check_blocks, fit_image
 from .implicit.fit_problem import Problem, build_apart
-from .openraster import LayeredPicture, SourceLayer
+from .layered.source import LayeredPicture, SourceLayer
 from .settings import Settings
 from .shapes.layers import LayerPlan, Plan, plan_layers
 from .shapes.masks import unique_names

@@ -10,12 +10,8 @@ import pytest
 
 import proxyimg_codec as pxi
 from proxyimg_codec.encoder.import_layers import composite, encode_layers
-from proxyimg_codec.encoder.openraster import (
-    LayeredPicture,
-    SourceLayer,
-    is_openraster,
-    read_openraster,
-)
+from proxyimg_codec.encoder.layered.openraster import is_openraster, read_openraster
+from proxyimg_codec.encoder.layered.source import LayeredPicture, SourceLayer
 from proxyimg_codec.encoder.settings import Settings
 from proxyimg_codec.export import openraster as export
 from proxyimg_codec.export.common import at_full_opacity
@@ -209,8 +205,8 @@ def test_layers_that_make_no_sense(stack, words):
 @pytest.mark.parametrize(
     ("stack", "words"),
     [
-        (layer(name="cat", composite_op="svg:multiply"), ["layer 'cat'", "'svg:multiply'"]),
-        (f'<stack name="g" composite-op="svg:screen">{layer()}</stack>', ["stack 'g'", "screen"]),
+        (layer(name="cat", composite_op="svg:dst-in"), ["layer 'cat'", "'svg:dst-in'"]),
+        (f'<stack name="g" composite-op="x:y">{layer()}</stack>', ["layer 'g'", "'x:y'"]),
         ('<filter type="blur"/>', ["filter", "only layers"]),
         (layer("text", name="cat"), ["layer 'cat'", "not a PNG"]),
         (layer("cut", name="cat"), ["layer 'cat'", "not a PNG"]),
@@ -564,7 +560,7 @@ def test_flags_of_the_decomposition_are_refused(tool, tmp_path, flags):
 
 @pytest.mark.parametrize(
     ("data", "code"),
-    [(b"", 3), (PNG, 3), (ora(layer(composite_op="svg:plus"), a=PNG), 5),
+    [(b"", 3), (PNG, 3), (ora(layer(composite_op="svg:xor"), a=PNG), 5),
      (ora(layer(), size=(1 << 30, 1), a=PNG), 6)],
     ids=["empty", "png", "blend", "huge"],
 )  # fmt: skip
