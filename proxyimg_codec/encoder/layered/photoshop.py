@@ -116,10 +116,10 @@ def _foreign(where: str) -> Iterator[None]:
             yield
     except (PxiError, MemoryError):
         raise
-    except ImportError as error:
+    except ImportError:
         raise UnsupportedError(
-            f"{where}: psd-tools needs more to draw this ({error.name}): "
-            "pip install 'psd-tools[composite]', or rasterize the layer"
+            f"{where}: psd-tools lacks a package to draw this: pip install 'psd-tools[composite]', "
+            "or rasterize the layer"
         ) from None
     except Exception as error:  # psd-tools raises errors of any class for damaged files
         problem = str(error).split("\n")[0][:200] or type(error).__name__
@@ -188,14 +188,16 @@ class _Reader:
         if node is None or not own:
             return [] if node is None else [node]
         shown = [v for v, n in own if n.shows]
-        plain = node.children is None and not node.blend and node.opacity == 1
-        if plain and not any(n.shows and (n.blend or n.children is not None) for _, n in own):
+        alike = all(n.children is None and not n.blend for _, n in own if n.shows)
+        effects = any(v.has_effects() for v in (base, *shown))
+        if alike and not effects and node.children is None and not node.blend and node.opacity == 1:
             return [node, *(self._clipped(base, node, v, n) for v, n in own)]
         # What blends within its base, or shares its translucence, cannot be a layer of its own.
-        if shown and node.shows and not node.blend:
+        blend = node.blend or _blending_within(node)
+        if shown and node.shows and not blend:
             self.notes.append(f"the layers clipped to {node.name!r} become one with it")
         whole = partial(self._drawn, (base, *shown), (base,))
-        return [replace(node, draw=whole, children=None)]
+        return [replace(node, draw=whole, children=None, blend=blend)]
 
     def _clipped(self, base: Any, below: Node, layer: Any, node: Node) -> Node:
         """Node of a layer that shows only where its base does."""
@@ -241,6 +243,8 @@ class _Reader:
                 self.notes.append(f"layer {name!r} is drawn without its effects: {what}")
         if not layer.is_group():
             return node
+        if isinstance(layer, kinds.Artboard):
+            self.notes.append(f"artboard {name!r} is taken as a group, without its background")
         inner = self.nodes(layer, (*groups, name or "group"))
         return replace(node, children=inner, isolated=mode != "PASS_THROUGH")
 
@@ -343,6 +347,14 @@ def _around(layer: Any) -> Iterator[Any]:
     while group is not None and group.parent is not None:
         yield group
         group = group.parent
+
+
+def _blending_within(node: Node) -> str:
+    """Blending of layers in a group with what lies behind the group; empty if none does."""
+    if node.children is None or node.isolated:
+        return ""
+    shown = [child for child in node.children if child.shows]
+    return next((b for child in shown if (b := child.blend or _blending_within(child))), "")
 
 
 def _clips_of(layer: Any) -> list[Any]:

@@ -183,6 +183,17 @@ def test_clipped_layers_that_cannot_stay_become_one_with_their_base(base, clip):
     looks_as_psd_tools_says(d, picture)
 
 
+@pytest.mark.parametrize("inner", ["NORMAL", "MULTIPLY"])
+def test_layers_that_are_clipped_to_a_group(inner):
+    d = Document()
+    d.layer("back", BACK)
+    d.layer("inside", BALL, d.group("g"), mode=inner)
+    d.layer("spot", TOP, clip=True)
+    picture = d.read()
+    assert [v.name for v in picture.layers] == (["back", "g"] if inner == "NORMAL" else ["back"])
+    looks_as_psd_tools_says(d, picture)
+
+
 @pytest.mark.parametrize("mode", ["MULTIPLY", "SOFT_LIGHT", "LINEAR_BURN", "LUMINOSITY"])
 def test_modes_are_flattened(mode):
     d = Document()
