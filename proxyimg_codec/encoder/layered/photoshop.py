@@ -30,6 +30,9 @@ from .source import Colours, LayeredPicture, check_limit, printable
 DRAWN_EFFECTS = ("Stroke", "ColorOverlay", "GradientOverlay", "PatternOverlay")
 """Effects that psd-tools draws."""
 
+DIFFERENT = 0.03
+"""Root of the mean squared difference from the flat picture, of 1 for white, that is told."""
+
 COLOURS = {"RGB": 3, "GRAYSCALE": 1}
 """Colour modes that can be imported, and their channels."""
 
@@ -101,6 +104,13 @@ def read_photoshop(
     picture = layered_picture(nodes, document.size, blend, reader.merge, limits, name)
     colours = dict(reader.colours.blocks or {})
     told = metadata.upright({k: v for k, v in blocks.items() if k != "icc"})
+    with _foreign(name):
+        difference = reader.difference()
+    if difference > DIFFERENT:
+        reader.notes.append(
+            "its layers look different from the flat picture in it: not all of them can be drawn; "
+            "--frame 0 takes the flat picture"
+        )
     notes = (*picture.notes, *dict.fromkeys(reader.notes))
     return replace(picture, blocks={**told, **colours}, notes=notes)
 
@@ -247,6 +257,20 @@ class _Reader:
             self.notes.append(f"artboard {name!r} is taken as a group, without its background")
         inner = self.nodes(layer, (*groups, name or "group"))
         return replace(node, children=inner, isolated=mode != "PASS_THROUGH")
+
+    def difference(self) -> float:
+        """Root of the mean squared difference between the layers and the flat picture in the file.
+
+        Effects of old files, artboards and the like are drawn in that alone. It is 0 if there is
+        none. Transparent parts are compared over white.
+        """
+        if not self.document.has_preview():
+            return 0.0
+        draw = import_module("psd_tools.composite").composite
+        drawn, _, alpha = draw(self.document, layer_filter=lambda layer: layer.visible)
+        flat, share = (self.document.numpy(kind) for kind in ("color", "shape"))
+        error = (alpha * drawn + 1 - alpha) - (share * flat + 1 - share)
+        return float(np.sqrt((error**2).mean()))
 
     def merge(self, below: Sequence[Node], scope: Node | None) -> Patch | None:
         """Draws layers that show as one, as `nodes.Merge`."""

@@ -260,6 +260,18 @@ def test_adjustments_that_cannot_be_drawn_are_named():
         d.read(blend="refuse")
 
 
+def test_what_cannot_be_drawn_is_told_by_the_flat_picture():
+    d = two()
+    # Of a file that was opened and not changed, the flat picture stays as it is.
+    d.psd = psd_tools.PSDImage.open(io.BytesIO(d.data()))
+    for level, told in ((0, False), (20, True)):
+        flat = np.asarray(d.psd.composite(force=True).convert("RGB")).astype(int) + level
+        planes = np.clip(flat, 0, 255).astype(np.uint8).transpose(2, 0, 1)
+        d.psd._record.image_data.set_data([p.tobytes() for p in planes], d.psd._record.header)
+        notes = d.read().notes
+        assert any("look different" in note for note in notes) is told
+
+
 def test_flat_files_are_no_layers():
     d = Document()
     d.layer("only", BACK)
