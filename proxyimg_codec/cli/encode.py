@@ -91,9 +91,10 @@ def _add_decomposition(p: argparse.ArgumentParser) -> None:
     add_prompts(p)
     add("--boundary", choices=["lsq", "chamfer"], help="boundary fit: least squares "
         "(default), or the slower adaptive Chamfer fit of the paper")  # fmt: skip
-    add("--background", choices=["diffuse", "complete"], default="diffuse",
-        help="hidden parts of the back layer: filled when decoding (default), or optimized and "
-        "stored (implicit)")  # fmt: skip
+    add("--background", choices=["auto", "smooth", "exemplar", "complete", "none", "diffuse"],
+        default="auto", help="hidden parts of layers: continued smoothly (also diffuse), copied "
+        "from what is around (pyramid), whichever suits (auto, the default), optimized and stored "
+        "(complete, implicit), or nothing is stored")  # fmt: skip
     add("--mesh", metavar="NAME", help="who makes proxy nodes: delaunay (default with texture "
         "implicit), triwild, ftetwild, or none (default with pyramid: edits make "
         "them)")  # fmt: skip

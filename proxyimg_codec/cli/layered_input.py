@@ -43,7 +43,7 @@ def layered_input(source: bytes, name: str, args: argparse.Namespace) -> Any:
     if is_openraster(source) or Path(args.input).suffix.lower() == ".ora":
         refuse_for_layers(args)
         return read_openraster(source, name, blend=args.blend)
-    flat = args.background != "diffuse" or given(args)
+    flat = args.background != "auto" or given(args)
     if not is_photoshop(source) or flat:
         return None
     if not has_reader():
@@ -70,7 +70,7 @@ def refuse_for_layers(args: argparse.Namespace) -> None:
 
     for flag in given(args):
         raise UsageError(f"{flag}: the input has layers of its own, which are kept")
-    if args.background != "diffuse":
+    if args.background != "auto":
         raise UsageError("--background: the layers of the input hide nothing unknown")
 
 
