@@ -170,6 +170,7 @@ def encode_file(args: argparse.Namespace) -> None:
 
     from ..codec.read import from_bytes
     from ..codec.write import to_bytes
+    from ..errors import InputError
     from ..io.files import read_bytes, write_atomically
     from ..render.quality import psnr
 
