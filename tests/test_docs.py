@@ -43,6 +43,7 @@ def commands(page):
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
+    psd_tools = pytest.importorskip("psd_tools")
     path = tmp_path_factory.mktemp("docs")
     raster.write(path / "photo.png", smooth(96, 64))
     (path / "masks" / "cat").mkdir(parents=True)
@@ -60,6 +61,13 @@ def folder(tmp_path_factory):
     raster.write(path / "bear.png", clear)
     raster.write(path / "parrots.png", smooth(96, 64))
     raster.write(path / "parrots-labels.png", np.repeat(labels[..., None], 3, 2))
+    layered = psd_tools.PSDImage.new("RGB", (96, 64))
+    layered.create_pixel_layer_from_array(smooth(96, 64), name="back")
+    layered.create_pixel_layer_from_array(clear, name="bear")
+    layered.save(path / "poster.psd")
+    (path / "parts" / "2 eyes").mkdir(parents=True)
+    for name in ("back.png", "1 body.png", "2 eyes/left.png"):
+        raster.write(path / "parts" / name, smooth(96, 64) if name == "back.png" else clear)
     (path / "breathe.json").write_text(blocks("docs/guide/animation.md", "json")[0])
     onnx_models.write(path / "u2netp.onnx", onnx_models.figures())
     onnx_models.write(path / "depth.onnx", onnx_models.depth())

@@ -19,7 +19,14 @@ from proxyimg_codec.geometry.mesh import Base, Mesh
 from proxyimg_codec.geometry.pose import REST, Pose
 from proxyimg_codec.limits import Limits
 from proxyimg_codec.model import Layer, Layers
-from proxyimg_codec.texture import context, diffusion, planes, pyramid, registered_model
+from proxyimg_codec.texture import (
+    completion,
+    context,
+    diffusion,
+    planes,
+    pyramid,
+    registered_model,
+)
 from proxyimg_codec.texture.grid import Grid
 from proxyimg_codec.texture.implicit import ImplicitTexture
 from proxyimg_codec.texture.latents import Latents
@@ -129,7 +136,7 @@ def table(chapter):
         ("5-geometry.md", (boundary, coverage), 5),
         ("7-implicit.md", (diffusion,), 2),
         ("6-mesh-and-pose.md", (connectivity, mesh, pose, warp), 17),
-        ("8-pyramid.md", (registered_model, context, laplace, planes, pyramid), 10),
+        ("8-pyramid.md", (registered_model, context, laplace, planes, pyramid, completion), 11),
     ],
 )
 def test_constants_are_those_of_the_code(chapter, modules, count):

@@ -7,11 +7,11 @@ import json
 import os
 import sys
 import time
-from dataclasses import fields, replace
-from pathlib import Path
+from dataclasses import fields
 from typing import Any
 
 from .common import Bar, parser, printable, warnings_shown
+from .layered_input import encoded_layers, layered_input
 from .places import (
     add_files,
     add_force_suffix,
@@ -34,7 +34,8 @@ def arguments() -> argparse.ArgumentParser:
     )
     add_files(
         p,
-        "picture file, .ora file whose layers become those of OUT, or - for standard input",
+        "picture file, .ora or .psd file whose layers become those of OUT, -: standard input, or "
+        "with --stack a folder",
         ".pxi file, - for standard output; IN with the suffix .pxi by default",
     )
     _add_aims(p)
@@ -90,9 +91,10 @@ def _add_decomposition(p: argparse.ArgumentParser) -> None:
     add_prompts(p)
     add("--boundary", choices=["lsq", "chamfer"], help="boundary fit: least squares "
         "(default), or the slower adaptive Chamfer fit of the paper")  # fmt: skip
-    add("--background", choices=["diffuse", "complete"], default="diffuse",
-        help="hidden parts of the back layer: filled when decoding (default), or optimized and "
-        "stored (implicit)")  # fmt: skip
+    add("--background", choices=["auto", "smooth", "exemplar", "complete", "none", "diffuse"],
+        default="auto", help="hidden parts of layers: continued smoothly (also diffuse), copied "
+        "from what is around (pyramid), whichever suits (auto, the default), optimized and stored "
+        "(complete, implicit), or nothing is stored")  # fmt: skip
     add("--mesh", metavar="NAME", help="who makes proxy nodes: delaunay (default with texture "
         "implicit), triwild, ftetwild, or none (default with pyramid: edits make "
         "them)")  # fmt: skip
@@ -113,6 +115,11 @@ def _add_details(p: argparse.ArgumentParser) -> None:
 def _add_reading(p: argparse.ArgumentParser) -> None:
     """Adds the flags that say what is taken from the input."""
     add = p.add_argument
+    add("--stack", action="store_true", help="IN is a folder of pictures of one size, one a layer, "
+        "in the order of their names from back to front; folders within are groups")  # fmt: skip
+    add("--blend", choices=["flatten", "refuse"], default="flatten", help="layers of IN with a "
+        "blending mode, and adjustment layers: flatten makes one layer of them and what lies "
+        "behind (default), refuse refuses IN")  # fmt: skip
     add("--frame", type=int, metavar="N", help="which picture of an input that holds several, "
         "counted from 0; by default the first, or the largest of an icon")  # fmt: skip
     add("--tone", choices=["clip"], help="clip: what is darker or brighter than 0..1 of sRGB is "
@@ -157,7 +164,8 @@ def encode_file(args: argparse.Namespace) -> None:
     if output == "-" and args.json:
         raise UsageError("--json and a picture cannot both go to standard output")
     check_suffix(output, args.force_suffix, "name it so, give several pictures a folder with -o")
-    check_target(output, args.force, *args.inputs, *mask_files(args.masks), args.scribble)
+    beside = [*files_in(args.masks), *(files_in(args.input) if args.stack else ())]
+    check_target(output, args.force, *args.inputs, *beside, args.scribble)
     settings = settings_from(args)
 
     from ..codec.read import from_bytes
@@ -166,7 +174,9 @@ def encode_file(args: argparse.Namespace) -> None:
     from ..render.quality import psnr
 
     started, cpu = time.perf_counter(), time.process_time()
-    source = read_bytes(args.input)
+    if not args.stack and os.path.isdir(args.input):
+        raise UsageError(f"{args.input}: is a folder; --stack makes layers of its pictures")
+    source = b"" if args.stack else read_bytes(args.input)
     bar = Bar(settings.steps, "fitting", args.quiet or args.json)
     try:
         image, original = encoded(source, args, settings, bar)
@@ -196,8 +206,8 @@ def encode_file(args: argparse.Namespace) -> None:
         print(printable(describe(report)), file=sys.stderr)
 
 
-def mask_files(path: str | None) -> list[str]:
-    """Files that --masks names, as far as they can be listed."""
+def files_in(path: str | None) -> list[str]:
+    """Files of a folder and those within, as far as they can be listed; or the one file."""
     if path is None:
         return []
     return [os.path.join(at, name) for at, _, names in os.walk(path) for name in names] or [path]
@@ -207,7 +217,7 @@ def encoded(source: bytes, args: argparse.Namespace, settings: Any, bar: Bar) ->
     """Encodes a picture file.
 
     Args:
-        source: Bytes of the file.
+        source: Bytes of the file; none of a folder.
         args: The parsed command line.
         settings: `Settings` of the encoder.
         bar: Progress bar.
@@ -216,10 +226,7 @@ def encoded(source: bytes, args: argparse.Namespace, settings: Any, bar: Bar) ->
         The encoded picture, and the original pixels [H, W, C] to compare it with.
     """
     from ..encoder.encode import encode
-    from ..encoder.import_layers import composite, encode_layers
-    from ..encoder.openraster import is_openraster, read_openraster
     from ..encoder.shapes.mask_files import load_masks
-    from ..io.color import is_srgb
     from ..io.raster import parse, stripped
 
     seen = 0
@@ -232,19 +239,9 @@ def encoded(source: bytes, args: argparse.Namespace, settings: Any, bar: Bar) ->
             seen = reached
 
     name = "standard input" if args.input == "-" else args.input
-    if is_openraster(source) or Path(args.input).suffix.lower() == ".ora":
-        refuse_for_layers(args)
-        layered = read_openraster(source, name)
-        if args.strip:
-            if not is_srgb(layered.blocks) and not args.quiet:
-                print(f"pxi-encode: warning: {printable(name)}: without its profile its colours "
-                      "look wrong", file=sys.stderr)  # fmt: skip
-            layered = replace(layered, blocks={})
-        image, kept = encode_layers(layered, settings, progress)
-        for layer in () if args.quiet else kept.left_out:
-            print(f"pxi-encode: warning: {printable(name)}: layer {layer!r} has nothing to be "
-                  "seen; left out", file=sys.stderr)  # fmt: skip
-        return image, composite(layered)
+    layered = layered_input(source, name, args)
+    if layered is not None:
+        return encoded_layers(layered, name, args, settings, progress)
     picture = parse(source, name, frame=args.frame, clip=args.tone == "clip")
     picture = stripped(picture) if args.strip else picture
     height, width = picture.pixels.shape[:2]
@@ -263,24 +260,6 @@ def encoded(source: bytes, args: argparse.Namespace, settings: Any, bar: Bar) ->
 def target(args: argparse.Namespace) -> str:
     """Name of the output file."""
     return default_target(args.input, ".pxi") if args.output is None else str(args.output)
-
-
-def refuse_for_layers(args: argparse.Namespace) -> None:
-    """Refuses flags about decomposition, which an input in layers does not need.
-
-    Its layers are kept, and they hide nothing that would have to be completed.
-
-    Raises:
-        UsageError: Such a flag is given.
-    """
-    from ..errors import UsageError
-
-    for name in ("masks", *FLAGS, "layers", "max_layers", "segmenter", "depth", "frame", "tone"):
-        if getattr(args, name) is not None:
-            flag = name.replace("_", "-")
-            raise UsageError(f"--{flag}: the input has layers of its own, which are kept")
-    if args.background != "diffuse":
-        raise UsageError("--background: the layers of the input hide nothing unknown")
 
 
 def settings_from(args: argparse.Namespace) -> Any:

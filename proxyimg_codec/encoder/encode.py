@@ -130,7 +130,8 @@ def _with_network(picture: Floats, plan: Plan, settings: Settings, report: Progr
 
     def problem_of(shape: NetShape, spacing: float) -> Problem:
         problem = build(picture, outlines, shape, spacing)
-        if outlines[0] is None and settings.sampling == "direct":
+        learnt = settings.sampling == "direct" and settings.background != "none"
+        if outlines[0] is None and learnt:
             problem = extended(problem, width, height, spacing)
         return problem
 

@@ -41,7 +41,7 @@ TEXTURES = ("auto", "implicit", "pyramid")
 TUNES = ("mse", "ms-ssim")
 SAMPLINGS = ("direct", "node")
 BOUNDARIES = ("lsq", "chamfer")
-BACKGROUNDS = ("diffuse", "complete")
+BACKGROUNDS = ("auto", "smooth", "exemplar", "complete", "none")
 
 
 @dataclass(frozen=True)
@@ -70,8 +70,11 @@ class Settings:
         sampling: ``direct``, or ``node`` for the paper's method: features from mesh and boundary,
             and a network whose size does not depend on quality; implicit only.
         boundary: Fit of boundaries: ``lsq`` (least squares) or ``chamfer`` (the paper's).
-        background: Hidden codes of the back layer: ``diffuse`` has the decoder fill them,
-            ``complete`` optimizes them for smoothness and stores them; implicit only.
+        background: What layers hide: ``smooth`` (also ``diffuse``) continues what is around
+            smoothly; ``exemplar`` copies what is around, pyramid only; ``auto`` is exemplar for
+            pyramids where surroundings are not smooth, and smooth otherwise; ``complete`` stores
+            codes that are optimized for smoothness, implicit only; ``none`` stores nothing and
+            learns nothing, so that decoders fill it.
         mesh: Name of the mesher, see `plugins`; ``none`` stores no meshes, and edits make them when
             needed; None = delaunay for implicit textures, else none.
         seed: Seed of all random numbers, 0..2**32 - 1.
@@ -96,13 +99,15 @@ class Settings:
     net_bits: int | None = None
     sampling: str = "direct"
     boundary: str = "lsq"
-    background: str = "diffuse"
+    background: str = "auto"
     mesh: str | None = None
     seed: int = 0
     jobs: int = 2
     device: str = "cpu"
 
     def __post_init__(self) -> None:
+        if self.background == "diffuse":
+            object.__setattr__(self, "background", "smooth")
         try:
             for name in ("quality", "target_bpp", "target_size", "target_psnr"):
                 if getattr(self, name) is not None:
@@ -148,6 +153,7 @@ class Settings:
         if len(aims) > 1:
             raise UsageError(f"{' and '.join(aims)} contradict each other")
         aims += ["tune ms-ssim"] if self.tune != "mse" else []
+        aims += ["background exemplar"] if self.background == "exemplar" else []
         only = self._implicit_alone()
         if aims and only:
             raise UsageError(f"{only[0]} needs texture implicit, {aims[0]} texture pyramid")
@@ -163,7 +169,7 @@ class Settings:
         """Names of the changed settings that only the implicit coder has."""
         given = {
             "sampling node": self.sampling != "direct",
-            "background complete": self.background != "diffuse",
+            "background complete": self.background == "complete",
             "feature_bits": self.feature_bits is not None,
             "net_bits": self.net_bits is not None,
             "device cuda": self.device != "cpu",

@@ -24,6 +24,9 @@ from .diffusion import FRACTION_BITS, Values, diffused
 FILL_ONE = 255 << FRACTION_BITS
 """Integer that stands for the sample 1.0 where hidden samples are completed and filled."""
 
+DRIFT = 12 << FRACTION_BITS
+"""Largest correction, which takes care of drifts of light; what does not fit at all would stain."""
+
 BAND = 1 << 18
 """Samples whose references are followed at a time, which bounds memory."""
 
@@ -118,7 +121,7 @@ def completed(values: Values, known: Samples, copies: Copies) -> tuple[Values, S
         drift = found[~inside]
         if len(rim):
             residual = np.zeros_like(own)
-            residual[rim] = own[rim] - found[inside]
+            residual[rim] = np.clip(own[rim] - found[inside], -DRIFT, DRIFT)
             drift += _spread(residual.reshape(1, *known.shape), beside, ~flat & now).ravel()[copied]
         own[copied] = np.clip(drift, 0, FILL_ONE)
     return out.reshape(values.shape), now.reshape(known.shape)

@@ -10,12 +10,8 @@ import pytest
 
 import proxyimg_codec as pxi
 from proxyimg_codec.encoder.import_layers import composite, encode_layers
-from proxyimg_codec.encoder.openraster import (
-    LayeredPicture,
-    SourceLayer,
-    is_openraster,
-    read_openraster,
-)
+from proxyimg_codec.encoder.layered.openraster import is_openraster, read_openraster
+from proxyimg_codec.encoder.layered.source import LayeredPicture, SourceLayer
 from proxyimg_codec.encoder.settings import Settings
 from proxyimg_codec.export import openraster as export
 from proxyimg_codec.export.common import at_full_opacity
@@ -209,8 +205,8 @@ def test_layers_that_make_no_sense(stack, words):
 @pytest.mark.parametrize(
     ("stack", "words"),
     [
-        (layer(name="cat", composite_op="svg:multiply"), ["layer 'cat'", "'svg:multiply'"]),
-        (f'<stack name="g" composite-op="svg:screen">{layer()}</stack>', ["stack 'g'", "screen"]),
+        (layer(name="cat", composite_op="svg:dst-in"), ["layer 'cat'", "'svg:dst-in'"]),
+        (f'<stack name="g" composite-op="x:y">{layer()}</stack>', ["layer 'g'", "'x:y'"]),
         ('<filter type="blur"/>', ["filter", "only layers"]),
         (layer("text", name="cat"), ["layer 'cat'", "not a PNG"]),
         (layer("cut", name="cat"), ["layer 'cat'", "not a PNG"]),
@@ -509,6 +505,56 @@ def test_tuning_acts():
     assert plain.to_bytes() != tuned.to_bytes()
 
 
+EDGES = stack(
+    source("back", rough(45, 37)), SourceLayer("spot", ball(33, 21, 11)[5:36, 18:49], 3, 2)
+)
+# Effort, targets and tuning have tests of their own.
+FLAGS = {
+    "pyramid": {"quality": 70.0, "boundary": "chamfer", "mesh": "delaunay"},
+    "implicit": {"quality": 70.0, "mesh": "none", "feature_bits": 6, "net_bits": 5, "seed": 7},
+}
+
+
+@pytest.fixture(scope="module")
+def usual():
+    """Files of the same layers with both coders and no other setting."""
+    small = replace(EDGES, width=45, height=37)
+    made = {t: encoded(small, replace(FAST, texture=t))[0] for t in FLAGS}
+    return small, {t: image.to_bytes() for t, image in made.items()}
+
+
+@pytest.mark.parametrize(("texture", "name"), [(t, n) for t in FLAGS for n in FLAGS[t]])
+def test_other_settings_act(usual, texture, name):
+    small, before = usual
+    image, _ = encoded(small, replace(FAST, texture=texture, **{name: FLAGS[texture][name]}))
+    after = pxi.from_bytes(image.to_bytes())
+    assert image.to_bytes() != before[texture]
+    assert psnr(composite(small), after) > 20
+
+
+def hairs(w: int, h: int) -> np.ndarray:
+    """A disc with rays that are thinner than a pixel, uint8 [h, w, 4]."""
+    y, x = np.mgrid[0:h, 0:w] + 0.5 - np.array([h, w])[:, None, None] / 2
+    angle, far = np.arctan2(y, x), np.hypot(x, y)
+    width = 0.7 * np.clip((h / 2 - 2 - far) / 2, 0, 1)
+    across = far * np.abs(np.sin(9 * angle)) / 9
+    alpha = np.maximum(np.clip(h / 4 - far, 0, 1), np.clip(width + 0.5 - across, 0, 1) * 0.8)
+    return np.dstack([rough(w, h), np.rint(255 * alpha).astype(np.uint8)])
+
+
+def test_thin_details_that_an_outline_misses_are_kept_by_alpha():
+    pixels = hairs(91, 83)
+    picture = LayeredPicture(97, 89, (SourceLayer("sun", pixels, 4, 3),))
+    image, _ = encoded(picture, replace(FAST, quality=75))
+    found = image.render()[3:86, 4:95, 3].astype(int)
+    error = np.abs(found - pixels[..., 3])
+    assert (error > 64).mean() < 0.002
+    assert image.layers["sun"].texture.alpha is not None
+    # A disc needs no alpha: its outline says it all.
+    disc, _ = encoded(stack(source("a", ball(30, 24, 15))), FAST)
+    assert disc.layers["a"].texture.alpha is None
+
+
 @pytest.mark.parametrize("size", [(1, 1), (2, 3), (7, 1), (9, 65)])
 @pytest.mark.parametrize("soft", [False, True])
 def test_layers_of_any_size(size, soft):
@@ -564,7 +610,7 @@ def test_flags_of_the_decomposition_are_refused(tool, tmp_path, flags):
 
 @pytest.mark.parametrize(
     ("data", "code"),
-    [(b"", 3), (PNG, 3), (ora(layer(composite_op="svg:plus"), a=PNG), 5),
+    [(b"", 3), (PNG, 3), (ora(layer(composite_op="svg:xor"), a=PNG), 5),
      (ora(layer(), size=(1 << 30, 1), a=PNG), 6)],
     ids=["empty", "png", "blend", "huge"],
 )  # fmt: skip

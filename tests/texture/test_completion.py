@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from proxyimg_codec.container import texr
 from proxyimg_codec.errors import FormatError
 from proxyimg_codec.texture import completion
-from proxyimg_codec.texture.completion import FILL_ONE, Copies, completed, unpack
+from proxyimg_codec.texture.completion import DRIFT, FILL_ONE, Copies, completed, unpack
 from proxyimg_codec.texture.diffusion import diffused
 from tests.support.pyramids import planes, view
 
@@ -60,7 +60,7 @@ def by_the_rule(values, known, references):
     for p, b in bases.items():
         if known[p]:
             rim[p] = True
-            residual[:, *p] = values[:, *p] - b
+            residual[:, *p] = np.clip(values[:, *p] - b, -DRIFT, DRIFT)
     drift = diffused(residual, rim) if rim.any() else np.zeros_like(values)
     for p, b in bases.items():
         if not known[p]:

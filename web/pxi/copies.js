@@ -7,6 +7,9 @@ import { clamp } from "./integers.js";
 
 export const FILL_ONE = 65280;
 
+/** The largest correction of a copy. */
+const DRIFT = 3072;
+
 /** The array of sources: channels, rows, columns and bits (PYR-48). */
 export function sourcesShape({ part, grain, offsets }) {
   const [columns, rows] = [part[2], part[3]].map((n) => Math.ceil(n / 2 ** grain));
@@ -80,7 +83,7 @@ export function copy(texr, sources, values, known) {
   const rim = there.map((some, i) => some && known[i]);
   const diffusion = rim.includes(1) ? new Diffusion(rim, h, w) : null;
   values.forEach((value, c) => {
-    const drift = value.map((v, i) => (rim[i] ? v - bases[c][i] : 0));
+    const drift = value.map((v, i) => (rim[i] ? clamp(v - bases[c][i], -DRIFT, DRIFT) : 0));
     diffusion?.fill(drift);
     copied.forEach((some, i) => {
       if (some) value[i] = clamp(bases[c][i] + drift[i], 0, FILL_ONE);

@@ -18,6 +18,7 @@ from ...texture.network import Floats
 from ...texture.occlusion import Occlusion
 from ...texture.planes import Planes, cells_of
 from ...texture.pyramid import PyramidTexture
+from ..completion.hidden import copies_of
 from ..completion.membrane import continued
 from ..settings import Settings
 from ..shapes.coverage import coverage_of
@@ -71,6 +72,7 @@ def encode_picture(picture: Floats, plan: Plan, settings: Settings, report: Repo
         _view(boundaries, k, coverage_of(boundary, width, height).reshape(height, width))
         for k, boundary in enumerate(boundaries)
     ]
+    copies = [copies_of(picture, cuts, settings) for _, cuts in views]
     rasters = [colour_of(picture)._replace(structural=settings.tune == "ms-ssim")]
     if plan.channels == 4:
         rasters.append(alpha_of(picture[..., 3]))
@@ -79,8 +81,8 @@ def encode_picture(picture: Floats, plan: Plan, settings: Settings, report: Repo
         layers = [
             Layer(v.name, box, v.boundary,
                   PyramidTexture(sources[0], sources[1] if len(sources) > 1 else None, box,
-                                 cuts=cuts), v.mesh, parent=v.parent)
-            for v, (box, cuts) in zip(plan.layers, views, strict=True)
+                                 cuts=cuts, copies=copied), v.mesh, parent=v.parent)
+            for v, (box, cuts), copied in zip(plan.layers, views, copies, strict=True)
         ]  # fmt: skip
         return Picture(width, height, plan.channels, plan.opaque, 8, Layers(layers), (),
                        groups=plan.groups)  # fmt: skip

@@ -138,14 +138,14 @@ def _mask_files(folder: Path, above: str = "") -> list[tuple[str, Path]]:
     except OSError as error:
         raise InputError(f"{folder}: cannot be read: {error.strerror}") from None
     files = [f for f in seen if f.suffix.lower() in TYPES and not f.is_dir()]
-    found = [(_stack_order(f), 0, [(above + region_name(f), f)]) for f in files]
+    found = [(stack_order(f), 0, [(above + region_name(f), f)]) for f in files]
     wholes = {region_name(f): f for f in reversed(files)}
     for other in (f for f in seen if f not in files):
         parts = []
         if other.is_dir() and not other.is_symlink():
             parts = _mask_files(other, f"{above}{region_name(other)}/")
         if parts:
-            found.append((_stack_order(wholes.get(region_name(other), other)), 1, parts))
+            found.append((stack_order(wholes.get(region_name(other), other)), 1, parts))
         elif other.is_dir() or is_picture(other):
             kind = "a folder without masks" if other.is_dir() else "no type of masks"
             logging.getLogger(__name__).warning("%s: %s; it is left out", other, kind)
@@ -156,7 +156,7 @@ def _stem(file: Path) -> str:
     return file.name if file.is_dir() else file.stem
 
 
-def _stack_order(file: Path) -> tuple[bool, list[tuple[int, str]], str]:
+def stack_order(file: Path) -> tuple[bool, list[tuple[int, str]], str]:
     """Sort key for natural order: `object 2` before `object 10`, the background before all."""
     stem = _stem(file).lower()
     natural = [(int(p), "") if p.isdecimal() else (-1, p) for p in re.findall(r"\d+|\D+", stem)]

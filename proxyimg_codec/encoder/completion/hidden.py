@@ -1,0 +1,38 @@
+"""Hidden samples of views: which of them are completed, and from what."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...texture.completion import Copies
+from ...texture.network import Floats
+from ...texture.occlusion import Occlusion
+from ..settings import Settings
+from .references import references
+
+OPAQUE = 0.99
+"""Least alpha of samples that are copied."""
+
+
+def copies_of(picture: Floats, cuts: Occlusion | None, settings: Settings) -> Copies | None:
+    """Chooses what the hidden samples of a view copy: those of its own shape that others cover.
+
+    Args:
+        picture: float32 [H, W, 4] in 0..1 with straight alpha.
+        cuts: Cuts of the view; None if nothing cuts it.
+        settings: Settings of the encoder, for `background` and the seed.
+
+    Returns:
+        The references, or None if a smooth fill is wanted or as good, or nothing can be copied.
+    """
+    if cuts is None or not cuts.fronts or settings.background not in ("auto", "exemplar"):
+        return None
+    x, y, width, height = cuts.box
+    part = picture[y : y + height, x : x + width]
+    bare = Occlusion(None, cuts.fronts, cuts.box)
+    inside = Occlusion(cuts.own, (), cuts.box).shown
+    known = cuts.trusted & bare.trusted
+    wanted = inside & ~bare.trusted & ~known
+    colours = np.ascontiguousarray(part[..., :3] * np.float32(255))
+    always = settings.background == "exemplar"
+    return references(colours, known & (part[..., 3] >= OPAQUE), wanted, settings.seed, always)

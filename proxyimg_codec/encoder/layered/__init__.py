@@ -1,0 +1,1 @@
+"""Readers of layered pictures: OpenRaster, Photoshop, folders of pictures."""
