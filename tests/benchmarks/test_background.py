@@ -4,10 +4,13 @@ import cv2
 import numpy as np
 import pytest
 
+from benchmarks import background as b
 from benchmarks import background_composites as c
 from benchmarks import background_removals as r
 from benchmarks import background_scores as s
 from benchmarks.background_peers import PEERS
+from proxyimg_codec import encode
+from proxyimg_codec.encoder.shapes.masks import Region
 from proxyimg_codec.io import raster
 from tests.support.pictures import disc
 
@@ -212,3 +215,21 @@ def test_composites_depend_on_the_seed_alone(tmp_path):
         assert not any(edge[:8].any() or edge[-8:].any() for edge in (rows, columns))
     assert not np.array_equal(other[0].hole, made[0].hole)
     assert len({one.mixed.shape for one in made}) == 2
+
+
+def test_a_cost_is_that_of_the_file():
+    picture, mask = noise(8, blur=2.0), s.eroded(HOLE, 6)
+    masks = [Region("object", mask)]
+    found = b.cost(picture, masks, "none")
+    file = encode(picture, masks=masks, background="none", effort=1).to_bytes()
+    assert found.size == len(file)
+    assert min(found.encoding, found.shown, found.removed) > 0
+
+
+@pytest.mark.parametrize("arguments", [["--only", "bytes,sizes"], ["--count", "0"]])
+def test_what_cannot_be_measured_is_refused(arguments, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("sys.argv", ["background", str(tmp_path), *arguments])
+    with pytest.raises(SystemExit) as stopped:
+        b.main()
+    assert stopped.value.code == 2
+    assert arguments[0] in capsys.readouterr().err
