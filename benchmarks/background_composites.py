@@ -104,23 +104,17 @@ def composites(
         yield made
 
 
-def filled(
-    images: dict[str, Image], hole: Mask, peers: Collection[str] = tuple(PEERS)
+def removed(images: dict[str, Image]) -> dict[str, Pixels]:
+    """Removes the layer ``object`` of pictures: uint8 [H, W, 3] by the same names."""
+    return {name: image.layers["object"].removed().render() for name, image in images.items()}
+
+
+def inpainted(
+    picture: Pixels, hole: Mask, names: Collection[str] = tuple(PEERS)
 ) -> dict[str, Pixels]:
-    """Removes an object by each method.
-
-    Args:
-        images: Encoded picture by kind of background, with a layer ``object``.
-        hole: bool [H, W], what the object covers.
-        peers: Names of methods of OpenCV.
-
-    Returns:
-        uint8 [H, W, 3] by name of the method; OpenCV gets the decoded picture.
-    """
-    out = {name: image.layers["object"].removed().render() for name, image in images.items()}
-    whole = images[OURS[0]].render()
+    """Fills a hole bool [H, W] of a picture uint8 [H, W, 3] by methods of OpenCV."""
     wide = scores.dilated(hole, TOUCHED)
-    return out | {name: PEERS[name](whole, wide) for name in peers}
+    return {name: PEERS[name](picture, wide) for name in names}
 
 
 def scored(picture: Pixels, image: Composite) -> list[float]:
@@ -155,7 +149,7 @@ def run(data: Path, count: int | None, seed: int, folder: Path | None) -> Iterat
             images[kind] = encode(image.mixed, masks=masks, background=kind, effort=1, jobs=1)
             seconds.append(time.process_time() - start)
         spent.append([*seconds, *(len(i.to_bytes()) for i in images.values())])
-        pictures = filled(images, image.hole)
+        pictures = removed(images) | inpainted(images[OURS[0]].render(), image.hole)
         tables.append([scored(pictures[name], image) for name in names])
         same.append(surrounded(image))
         truth.append(scores.coherence(image.photo, image.hole))

@@ -184,9 +184,7 @@ def test_the_largest_thing_that_is_not_most_of_the_picture_goes():
 
 
 def test_rows_of_sheets_are_stacked_whatever_their_width():
-    high, wide = np.full((700, 300, 3), 9, np.uint8), np.full((120, 960, 3), 200, np.uint8)
-    rows = [r.row_of([high, high]), r.row_of([wide])]
-    assert [row.shape for row in rows] == [(480, 412, 3), (60, 480, 3)]
+    rows = [np.full((480, 412, 3), 9, np.uint8), np.full((60, 480, 3), 200, np.uint8)]
     sheet = r.stacked(rows)
     assert sheet.shape == (540, 480, 3)
     assert (sheet[:480, 412:] == 128).all()
@@ -215,6 +213,19 @@ def test_composites_depend_on_the_seed_alone(tmp_path):
         assert not any(edge[:8].any() or edge[-8:].any() for edge in (rows, columns))
     assert not np.array_equal(other[0].hole, made[0].hole)
     assert len({one.mixed.shape for one in made}) == 2
+
+
+def test_a_row_shows_the_picture_and_each_method(monkeypatch):
+    monkeypatch.setattr(r, "TILE", (60, 60))
+    monkeypatch.setattr(r, "SHOWN", ("Telea", "NS", "smooth", "auto"))
+    picture, mask = noise(8, blur=2.0), s.eroded(HOLE, 6)
+    image = encode(picture, masks=[Region("object", mask)], background="none", effort=1)
+    row = r.row_of(picture, mask, {"auto": image, "smooth": image})
+    assert row.shape == (48, 5 * 60, 3)
+    own = [row[:, 60 * k : 60 * k + 60].astype(int) for k in range(5)]
+    assert (own[3] == own[4]).all()
+    away = cv2.resize(s.dilated(mask, 8).astype(np.uint8), (60, 48)) == 0
+    assert max(np.abs(other - own[0])[away].mean() for other in own[1:]) < 8
 
 
 def test_a_cost_is_that_of_the_file():
