@@ -1,174 +1,173 @@
-"""How well the part of a background that an object hides is completed.
+"""How well what an object hides of the back is completed, and what that costs.
 
-    python -m benchmarks.background DATA [--count N] [--seed S] [--effort E] [--pictures DIR]
+    python -m benchmarks.background DATA [--only SECTIONS] [--count N] [--seed S] [--pictures DIR]
 
-A sprite with true alpha is pasted on a photograph. The composite is encoded with the true mask, and
-the object is removed. Then the part that it hid is compared with the photograph, over the hole (all
-pixels that the object covers, also in part) and in the band of 6 px inside its rim. For comparison,
-OpenCV inpaints the decoded composite with radius 3, in the hole and 1 px around it. The method was
-developed on seed 0; other seeds, with other sprites in other places, confirm it.
+Sections, with commas between them:
+
+- ``composites``: cliparts and anime figures are pasted with true alpha on 40 Kodak pictures, 480 px
+  wide or high. They are encoded with the true masks (``-e 1``), the object is removed, and what
+  stands in its place is compared with the photograph and with what is around, beside OpenCV's
+  inpainting, which gets the decoded picture. The method was developed on other composites than
+  those of any seed.
+- ``bytes``: bytes, and CPU time of encoding and decoding, of the Kodak pictures with label maps.
+- ``large``: CPU time and memory of one of them enlarged to 12 megapixels.
+- ``removals``: sheets of removals, in ``--pictures``, and 30 numbered pictures to be shown to
+  people who have not seen the original.
+
+DATA has ``kodak/``, ``kodak_masks/``, ``photo/``, ``clipart/`` and ``anime/``.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
-from itertools import islice, zip_longest
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from benchmarks.common import Pixels, header, kodak, read_rgb
-from proxyimg_codec import encode
-from proxyimg_codec.api import Image
+from benchmarks import background_composites, background_removals
+from benchmarks.common import Pixels, header, read_rgb, run_limited
+from benchmarks.layer_scores import interval
+from proxyimg_codec import encode, from_bytes
+from proxyimg_codec.encoder.shapes.labels import label_regions
 from proxyimg_codec.encoder.shapes.masks import Region
 from proxyimg_codec.io import raster
 
-WIDTH, HEIGHT = 384, 256
-BAND = 6
-MARGIN = 8
-SPRITES = ("clipart/*.png", "emoji/emoji_fluent*.webp", "anime/*.png", "emoji/emoji_noto*.png")
-PEERS = {"Telea": cv2.INPAINT_TELEA, "NS": cv2.INPAINT_NS}
-OURS = ("diffuse", "complete")
+BACKGROUNDS = ("auto", "none")
+"""The default, and the one that stores nothing for what is hidden, as the smooth one does."""
 
-Scores = dict[str, list[tuple[float, float]]]
+REPEATED = 5
+"""Times that a picture is decoded; the fastest counts."""
+
+LARGE, LARGE_SIZE = "kodim23", (4240, 2827)
+"""The picture that is enlarged, and its width and height then."""
+
+ENLARGED = """
+import cv2
+from proxyimg_codec import encode
+from proxyimg_codec.encoder.shapes.labels import label_regions
+from proxyimg_codec.io import raster
+rgb = raster.read({picture!r}).pixels[..., :3]
+labels = raster.read({labels!r}).pixels[..., 0]
+rgb = cv2.resize(rgb, {size}, interpolation=cv2.INTER_CUBIC)
+labels = cv2.resize(labels, {size}, interpolation=cv2.INTER_NEAREST)
+encode(rgb, masks=label_regions(labels, "labels"), effort=1, jobs=1, background={background!r})
+"""
 
 
-def sprites(data: Path) -> Iterator[tuple[str, Pixels]]:
-    """Yields name and RGBA [H, W, 4] of sprites, of each kind in turn.
+class Cost(NamedTuple):
+    """Cost of a picture.
 
-    Sprites that cover less than a fifth of their picture are left out.
+    Attributes:
+        size: Bytes of the file.
+        encoding: CPU seconds of encoding.
+        shown: CPU milliseconds of decoding and drawing the picture.
+        removed: CPU milliseconds of decoding, and of drawing it without its first object.
     """
-    kinds = [sorted(data.glob(pattern)) for pattern in SPRITES]
-    for path in (p for row in zip_longest(*kinds) for p in row if p is not None):
-        pixels = raster.read(path).pixels
-        if pixels.shape[2] == 4 and (pixels[..., 3] > 127).mean() > 0.2:
-            yield path.stem, pixels
+
+    size: float
+    encoding: float
+    shown: float
+    removed: float
 
 
-def composite(photo: Pixels, sprite: Pixels, seed: int) -> tuple[Pixels, Pixels, NDArray[np.bool_]]:
-    """Pastes a sprite on the middle of a photograph.
-
-    Args:
-        photo: uint8 [H, W, 3] photograph.
-        sprite: uint8 [h, w, 4] sprite with straight alpha.
-        seed: Seed of the size and place of the sprite.
-
-    Returns:
-        Photograph and composite, uint8 [HEIGHT, WIDTH, 3], and mask, bool [HEIGHT, WIDTH].
-    """
-    rng = np.random.default_rng(seed)
-    y, x = (photo.shape[0] - HEIGHT) // 2, (photo.shape[1] - WIDTH) // 2
-    photo = np.ascontiguousarray(photo[y : y + HEIGHT, x : x + WIDTH])
-    scale = rng.uniform(0.35, 0.6) * HEIGHT / max(sprite.shape[:2])
-    small = cv2.resize(sprite, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-    h, w = small.shape[:2]
-    y, x = (int(rng.integers(MARGIN, n)) for n in (HEIGHT - h - MARGIN, WIDTH - w - MARGIN))
-    alpha = small[..., 3:].astype(np.float64) / 255
-    mixed = photo.astype(np.float64)
-    part = mixed[y : y + h, x : x + w]
-    mixed[y : y + h, x : x + w] = alpha * small[..., :3] + (1 - alpha) * part
-    mask = np.zeros((HEIGHT, WIDTH), bool)
-    mask[y : y + h, x : x + w] = alpha[..., 0] >= 0.5
-    return photo, np.rint(mixed).astype(np.uint8), mask
+def cost(rgb: Pixels, masks: list[Region], background: str) -> Cost:
+    """Encodes a picture, and decodes it `REPEATED` times."""
+    start = time.process_time()
+    image = encode(rgb, masks=masks, background=background, effort=1, jobs=1)
+    encoding, file = time.process_time() - start, image.to_bytes()
+    shown, removed = list[float](), list[float]()
+    for _ in range(REPEATED):
+        start = time.process_time()
+        from_bytes(file).render()
+        middle = time.process_time()
+        from_bytes(file).layers[1].removed().render()
+        shown.append(1000 * (middle - start))
+        removed.append(1000 * (time.process_time() - middle))
+    return Cost(len(file), encoding, min(shown), min(removed))
 
 
-def completions(images: dict[str, Image]) -> tuple[NDArray[np.bool_], dict[str, Pixels]]:
-    """Removes the object by each method.
-
-    Args:
-        images: The encoded composite, by kind of background.
-
-    Returns:
-        bool [HEIGHT, WIDTH] hole, and the picture without the object by the name of the method.
-    """
-    image = images[OURS[0]]
-    hole = image.render(layers=["object"], dtype=np.float32)[..., 3] > 0
-    wide = cv2.dilate(hole.astype(np.uint8), np.ones((3, 3), np.uint8))
-    filled = {name: each.render(layers=["back"]) for name, each in images.items()}
-    whole = image.render()
-    for name, method in PEERS.items():
-        filled[name] = np.asarray(cv2.inpaint(whole, wide, 3, method))
-    return hole, filled
-
-
-def psnr(photo: Pixels, filled: Pixels, where: NDArray[np.bool_]) -> float:
-    """PSNR in dB of pictures in 0..255 over the pixels `where`, bool [H, W]."""
-    error = (photo[where].astype(np.float64) - filled[where]) ** 2
-    return float(10 * np.log10(255**2 / max(float(error.mean()), 1e-6)))
-
-
-def report(scores: Scores, sizes: dict[str, list[int]]) -> None:
-    """Prints means, and compares the default with the better inpainting."""
-    means = {name: np.mean(values, axis=0) for name, values in scores.items()}
-    print(f"mean of {len(scores[OURS[0]])} composites")
-    for name, (hole, band) in means.items():
-        line = f"{name:9s} hole {hole:.2f} dB, band {band:.2f} dB"
-        if name in sizes:
-            size = float(np.mean(sizes[name]))
-            line += f", {size:.0f} bytes, {8 * size / (WIDTH * HEIGHT):.3f} bpp"
-        print(line)
-    ahead = means[OURS[0]] - np.max([means[name] for name in PEERS], axis=0)
-    for text, by, good in (
-        ("band, better than both inpaintings", ahead[1], ahead[1] > 0),
-        ("hole, within 1 dB of the better inpainting", ahead[0], ahead[0] > -1),
+def costs(data: Path, count: int | None, seed: int, folder: Path | None) -> Iterator[str]:
+    """Yields bytes, and CPU time of encoding and decoding, of pictures with label maps."""
+    files = sorted((data / "kodak_masks").glob("*.png"))[:count]
+    found = list[list[Cost]]()
+    for path in files:
+        rgb = read_rgb(data / "kodak" / path.name)
+        masks = label_regions(raster.read(path).pixels[..., 0], path.name)
+        found.append([cost(rgb, masks, background) for background in BACKGROUNDS])
+    more = [100 * (a.size / b.size - 1) for a, b in found]
+    worst = int(np.argmax(more))
+    low, high = interval(more)
+    yield (
+        f"bytes of {len(files)} Kodak pictures with label maps, {' against '.join(BACKGROUNDS)}: "
+        f"{np.mean(more):+.2f} % ({low:+.2f}..{high:+.2f}), at most {more[worst]:+.2f} % "
+        f"({files[worst].stem}); {sum(a.size > b.size for a, b in found)} have more"
+    )
+    for name, text in (
+        ("encoding", "CPU-s of encoding"),
+        ("shown", "CPU-ms of decoding the picture"),
+        ("removed", "CPU-ms of decoding it without an object"),
     ):
-        print(f"{text}: {'yes' if good else 'NO'} ({by:+.2f} dB)")
+        without = [getattr(b, name) for _, b in found]
+        extra = [getattr(a, name) - w for (a, _), w in zip(found, without, strict=True)]
+        yield (
+            f"{text}: {np.mean(extra):+.2f} in the mean, {max(extra):+.2f} at most, beside "
+            f"{np.mean(without):.2f}"
+        )
 
 
-def run(
-    data: Path, count: int = 24, seed: int = 0, effort: int = 4, folder: Path | None = None
-) -> None:
-    """Makes, encodes and completes composites, and prints the scores.
+def large(data: Path, count: int | None, seed: int, folder: Path | None) -> Iterator[str]:
+    """Yields CPU time and memory of encoding an enlarged picture."""
+    found = {}
+    for background in BACKGROUNDS:
+        code = ENLARGED.format(
+            picture=str(data / "kodak" / f"{LARGE}.png"),
+            labels=str(data / "kodak_masks" / f"{LARGE}.png"),
+            size=LARGE_SIZE, background=background,
+        )  # fmt: skip
+        found[background] = run_limited(code, threads=1)[1:]
+    (memory, seconds), (less, fewer) = found.values()
+    yield (
+        f"large, {LARGE} at {LARGE_SIZE[0]} x {LARGE_SIZE[1]}, {BACKGROUNDS[0]} against "
+        f"{BACKGROUNDS[1]}: {seconds - fewer:+.1f} CPU-s beside {fewer:.1f}, "
+        f"{memory - less:+.2f} GB beside {less:.2f}"
+    )
 
-    Args:
-        data: Folder with ``kodak/`` and the folders of sprites.
-        count: Number of composites, at most 24.
-        seed: Seed that chooses sprites and their places.
-        effort: Effort of the encoder, 1..9.
-        folder: Folder for pictures of the results, or None.
-    """
-    if folder:
-        folder.mkdir(parents=True, exist_ok=True)
-    scores: Scores = {}
-    sizes: dict[str, list[int]] = {}
-    photos, first = kodak(data), 24 * seed
-    pairs = zip(photos[:count], islice(sprites(data), first, None), strict=False)
-    for i, (path, (name, sprite)) in enumerate(pairs, first):
-        photo, mixed, mask = composite(read_rgb(path), sprite, i)
-        masks = [Region("object", mask)]
-        images = {
-            v: encode(mixed, masks=masks, background=v, effort=effort, texture="implicit")
-            for v in OURS
-        }
-        for kind, image in images.items():
-            sizes.setdefault(kind, []).append(len(image.to_bytes()))
-        hole, filled = completions(images)
-        band = hole & (cv2.distanceTransform(hole.astype(np.uint8), cv2.DIST_L2, 5) <= BAND)
-        for kind, picture in filled.items():
-            scores.setdefault(kind, []).append(
-                (psnr(photo, picture, hole), psnr(photo, picture, band))
-            )
-        if folder:
-            row = np.hstack([photo, mixed, *filled.values()])
-            raster.write(folder / f"{i:02d}-{name}.png", row)
-    report(scores, sizes)
+
+Section = Callable[[Path, int | None, int, Path | None], Iterator[str]]
+
+SECTIONS: dict[str, Section] = {
+    "composites": background_composites.run, "bytes": costs, "large": large,
+    "removals": background_removals.run,
+}  # fmt: skip
 
 
 def main() -> None:
     """Runs the command line."""
-    p = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    p.add_argument("data", type=Path, help="folder with kodak, clipart, emoji and anime")
-    p.add_argument("--count", type=int, default=24, help="composites, at most 24")
-    p.add_argument("--seed", type=int, default=0, help="0 .. 4, which sprites, and where")
-    p.add_argument("--effort", type=int, default=4)
-    p.add_argument("--pictures", type=Path, metavar="DIR", help="where to put pictures, each the "
-                   "photograph, the composite, and " + ", ".join((*OURS, *PEERS)))  # fmt: skip
-    args = p.parse_args()
-    print(header(args.data))
-    run(args.data, args.count, args.seed, args.effort, args.pictures)
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("data", type=Path)
+    parser.add_argument("--only", default=",".join(SECTIONS), help="sections, with commas")
+    parser.add_argument("--count", type=int, help="most pictures of a section")
+    parser.add_argument("--seed", type=int, default=1, help="which composites")
+    parser.add_argument("--pictures", type=Path, metavar="DIR", help="where pictures are written")
+    args = parser.parse_args()
+    chosen = [name for name in args.only.split(",") if name]
+    if unknown := set(chosen) - set(SECTIONS):
+        parser.error(f"--only: {', '.join(sorted(unknown))}; there are {', '.join(SECTIONS)}")
+    if args.count is not None and args.count < 1:
+        parser.error("--count: at least 1")
+    if args.pictures:
+        args.pictures.mkdir(parents=True, exist_ok=True)
+    cv2.setNumThreads(1)
+    print(header(args.data), flush=True)
+    for name in chosen:
+        start = time.process_time()
+        for line in SECTIONS[name](args.data, args.count, args.seed, args.pictures):
+            print(line, flush=True)
+        print(f"  {time.process_time() - start:.0f} CPU-s", flush=True)
 
 
 if __name__ == "__main__":

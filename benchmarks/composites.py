@@ -140,12 +140,12 @@ def _placed(
     for _ in range(TRIES):
         if len(placed) == count:
             break
-        scaled = _scaled(chosen[len(placed)], rng.uniform(*SIZES) * max(shape))
-        room = [n - m for n, m in zip(shape, scaled.shape, strict=False)]
+        small = scaled(chosen[len(placed)], rng.uniform(*SIZES) * max(shape))
+        room = [n - m for n, m in zip(shape, small.shape, strict=False)]
         if min(room) < 0:
             continue
         y, x = (int(rng.integers(r + 1)) for r in room)
-        sprite = Sprite(scaled, x, y)
+        sprite = Sprite(small, x, y)
         mask = sprite.on(shape)[..., 3] >= 128
         last = overlapping and len(placed) == count - 1
         covered = (masks[-1] & mask).sum() / masks[-1].sum() if last else 0.0
@@ -233,7 +233,7 @@ def _softened(rgba: Pixels, blur: float) -> Floats:
     return layer
 
 
-def _scaled(rgba: Pixels, side: float) -> Pixels:
+def scaled(rgba: Pixels, side: float) -> Pixels:
     """Scales a sprite to a longer side of `side` pixels, with premultiplied colours."""
     scale = side / max(rgba.shape[:2])
     size = (max(1, round(rgba.shape[1] * scale)), max(1, round(rgba.shape[0] * scale)))

@@ -1,6 +1,6 @@
 """Editing: what it costs, what it leaves alone, and what it adds to a file.
 
-    python -m benchmarks.editing DATA [--only time exact mesh removal paper]
+    python -m benchmarks.editing DATA [--only time exact mesh paper]
 
 DATA holds the Kodak pictures, their label maps and the cliparts. Times are CPU times of one thread.
 """
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import proxyimg_codec as pxi
-from benchmarks import background, paper
+from benchmarks import paper
 from benchmarks.common import Pixels, centre_crop, header, kodak, read_rgb, run_limited
 from proxyimg_codec.api import Image
 from proxyimg_codec.container import mesh as mesh_chunk
@@ -176,7 +176,7 @@ def meshes(data: Path) -> None:
 
 def main() -> None:
     """Runs the command line."""
-    sections = ("time", "exact", "mesh", "removal", "paper")
+    sections = ("time", "exact", "mesh", "paper")
     p = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     p.add_argument("data", type=Path)
     p.add_argument("--only", nargs="+", choices=sections, default=sections)
@@ -197,8 +197,6 @@ def main() -> None:
             exactness(image)
     if "mesh" in args.only:
         meshes(args.data)
-    if "removal" in args.only:
-        background.run(args.data)
     if "paper" in args.only:
         paper.run(args.data)
 
