@@ -18,6 +18,7 @@ from ...texture.network import Floats
 from ...texture.occlusion import Occlusion
 from ...texture.planes import Planes, cells_of
 from ...texture.pyramid import PyramidTexture
+from ..completion.behind import Source, pixels_behind
 from ..completion.hidden import copies_of
 from ..completion.membrane import continued
 from ..settings import Settings
@@ -49,7 +50,9 @@ class Interrupts:
     seen: bool = False
 
 
-def encode_picture(picture: Floats, plan: Plan, settings: Settings, report: Report) -> Picture:
+def encode_picture(
+    picture: Floats, plan: Plan, settings: Settings, report: Report, behind: Source | None = None
+) -> Picture:
     """Encodes planned layers with pyramid textures.
 
     On `KeyboardInterrupt` during refinement, the picture has the latents that were found so far.
@@ -59,11 +62,13 @@ def encode_picture(picture: Floats, plan: Plan, settings: Settings, report: Repo
         plan: Plan of the layers.
         settings: Settings of the encoder.
         report: Called with the name of a stage, and its numbers of units done and in all.
+        behind: What gives the hidden pixels of the back layer; None if they are copied or filled.
 
     Returns:
         A picture with a depth of 8 bits, without metadata.
 
     Raises:
+        InputError: An inpainter fails.
         UsageError: A target size or PSNR is out of reach.
     """
     height, width = picture.shape[:2]
@@ -72,17 +77,27 @@ def encode_picture(picture: Floats, plan: Plan, settings: Settings, report: Repo
         _view(boundaries, k, coverage_of(boundary, width, height).reshape(height, width))
         for k, boundary in enumerate(boundaries)
     ]
-    copies = [copies_of(picture, cuts, settings) for _, cuts in views]
-    rasters = [colour_of(picture)._replace(structural=settings.tune == "ms-ssim")]
+    structural = settings.tune == "ms-ssim"
+    rasters = [colour_of(picture)._replace(structural=structural)]
     if plan.channels == 4:
         rasters.append(alpha_of(picture[..., 3]))
+    shared = len(rasters)
+    own = None if behind is None else _behind(rasters[0], views[0][1], behind)
+    if own is not None:
+        rasters.append(own._replace(structural=structural))
+    copies = [
+        None if own is not None and k == 0 else copies_of(picture, cuts, settings)
+        for k, (_, cuts) in enumerate(views)
+    ]
 
     def picture_of(sources: Sequence[Planes]) -> Picture:
+        alpha = sources[1] if shared > 1 else None
+        more = None if own is None else sources[shared]
         layers = [
             Layer(v.name, box, v.boundary,
-                  PyramidTexture(sources[0], sources[1] if len(sources) > 1 else None, box,
-                                 cuts=cuts, copies=copied), v.mesh, parent=v.parent)
-            for v, (box, cuts), copied in zip(plan.layers, views, copies, strict=True)
+                  PyramidTexture(sources[0], alpha, box, cuts=cuts, behind=None if k else more,
+                                 copies=copies[k]), v.mesh, parent=v.parent)
+            for k, (v, (box, cuts)) in enumerate(zip(plan.layers, views, strict=True))
         ]  # fmt: skip
         return Picture(width, height, plan.channels, plan.opaque, 8, Layers(layers), (),
                        groups=plan.groups)  # fmt: skip
@@ -245,6 +260,23 @@ def colour_of(picture: Floats) -> Raster:
 def alpha_of(alpha: Floats) -> Raster:
     """Makes a grey raster of alpha, float32 [H, W] in 0..1."""
     return Raster(np.repeat(alpha[..., None] * np.float32(255), 3, 2), None, None, True)
+
+
+def _behind(colour: Raster, cuts: Occlusion | None, source: Source) -> Raster | None:
+    """Makes a raster of the hidden pixels of the back layer; None if nothing of it is hidden.
+
+    Args:
+        colour: Raster of the picture.
+        cuts: Cuts of the back layer.
+        source: What gives the pixels.
+    """
+    found = pixels_behind(colour.samples / np.float32(255), cuts, source)
+    if found is None:
+        return None
+    pixels, hidden = found
+    samples = pixels * np.float32(255)
+    grey = colour.grey and bool((samples == samples[..., :1]).all())
+    return Raster(samples, hidden.astype(np.float32), _cells(hidden), grey)
 
 
 def _cells(mask: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
