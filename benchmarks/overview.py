@@ -33,14 +33,17 @@ def main() -> None:
     masks, out = sys.argv[1:]
     photo = read_rgb(PHOTO)
     height, width = photo.shape[:2]
-    image = encode(photo, quality=60, texture="implicit", masks=load_masks(masks, width, height))
+    image = encode(photo, quality=60, masks=load_masks(masks, width, height))
+    empty = image
+    for name in [layer.name for layer in image.layers][1:]:
+        empty = empty.layers[name].removed()
     x, y, w, h = DETAIL
     bicubic = cv2.resize(photo[y : y + h, x : x + w], SIZE, interpolation=cv2.INTER_CUBIC)
     parts = [
         photo,
         image.render(),
         on_white(image.render(layers=[1])),
-        image.render(layers=["back"]),
+        empty.render(),
         image.render(region=DETAIL, width=SIZE[0], height=SIZE[1]),
         bicubic,
     ]

@@ -457,8 +457,8 @@ def masks() -> bytes:
 @bomb
 def sources() -> bytes:
     """References of as many cells as are allowed, each of one sample that shows nowhere."""
-    width, height = 2048, 2040
-    masked: Values = {"cell": 6, "mask": lonely(32, 32), "offsets": [1, 1] * 16}
+    width, height = 256, 256
+    masked: Values = {"cell": 6, "mask": lonely(4, 4), "offsets": [1, 1] * 16}
     copied = view(width, height, sources=_ones(2, height, width), **masked)
     return made([layer()], [copied], planes=(plan(width, height),))
 

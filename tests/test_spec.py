@@ -23,6 +23,7 @@ from proxyimg_codec.texture import (
     completion,
     context,
     diffusion,
+    lifts,
     planes,
     pyramid,
     registered_model,
@@ -136,7 +137,11 @@ def table(chapter):
         ("5-geometry.md", (boundary, coverage), 5),
         ("7-implicit.md", (diffusion,), 2),
         ("6-mesh-and-pose.md", (connectivity, mesh, pose, warp), 17),
-        ("8-pyramid.md", (registered_model, context, laplace, planes, pyramid, completion), 11),
+        (
+            "8-pyramid.md",
+            (registered_model, context, laplace, planes, pyramid, completion, lifts),
+            15,
+        ),
     ],
 )
 def test_constants_are_those_of_the_code(chapter, modules, count):

@@ -17,6 +17,7 @@ from proxyimg_codec.texture import (
     context,
     grid,
     latents,
+    lifts,
     occlusion,
     planes,
     pyramid,
@@ -25,6 +26,7 @@ from proxyimg_codec.texture import (
 )
 from proxyimg_codec.texture.context import LevelCoder
 from proxyimg_codec.texture.grid import Grid
+from proxyimg_codec.texture.lifts import lifts_of
 from proxyimg_codec.texture.occlusion import ALL_IN_PLACE, ALL_REMOVED, Moved, Occlusion
 from proxyimg_codec.texture.pyramid import PyramidTexture
 
@@ -270,7 +272,10 @@ _FAULTS: dict[str, list[Patch]] = {
     "sources-without-upper-bits": [(pyramid, "unpacked_copies", _low_sources)],
     "copies-without-overlap": [(completion, "_weights", _nearest_cell)],
     "copies-what-is-not-known": [(completion, "_bases",
-        lambda values, known, copies: bases_of(values, np.ones_like(known), copies))],
+        lambda values, known, *how: bases_of(values, np.ones_like(known), *how))],
+    "copies-without-lifts": [(completion, "lifts_of", lambda copier: 0 * lifts_of(copier))],
+    "copies-lifted-once": [(lifts, "TURNS", 1)],
+    "copies-lifted-without-bound": [(lifts, "LIFT", 1 << 20)],
     "copies-without-rim": [(completion, "diffused", lambda value, *how: 0 * value)],
     "copies-not-clamped": [(completion, "FILL_ONE", 1 << 30)],
     "trusts-samples-near": [(occlusion, "REACH", 1)],

@@ -101,7 +101,7 @@ _TOPICS = {
     "pyramid: moved": "PYR-46",
     "pyramid: behind": "PYR-47",
     "pyramid: copies": "PYR-48 PYR-49",
-    "pyramid: rim": "PYR-50",
+    "pyramid: rim": "PYR-50 PYR-51",
     # Rendering.
     "opaque": "CHK-3 REN-12",
     "alpha": "TEX-18 REN-7 REN-12",

@@ -172,12 +172,13 @@ def encode_file(args: argparse.Namespace) -> None:
 
     from ..codec.read import from_bytes
     from ..codec.write import to_bytes
+    from ..errors import InputError
     from ..io.files import read_bytes, write_atomically
     from ..render.quality import psnr
 
     started, cpu = time.perf_counter(), time.process_time()
     if not args.stack and os.path.isdir(args.input):
-        raise UsageError(f"{args.input}: is a folder; --stack makes layers of its pictures")
+        raise InputError(f"{args.input}: is a folder; --stack makes layers of its pictures")
     source = b"" if args.stack else read_bytes(args.input)
     bar = Bar(settings.steps, "fitting", args.quiet or args.json)
     try:

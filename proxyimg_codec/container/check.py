@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from math import prod
 
 from ..errors import FormatError, UnsupportedError
 from ..limits import Budget
@@ -233,6 +234,10 @@ def _check_copies(texture: Values) -> None:
     if len(offsets) % 2 or len(offsets) > 2 * texr.OFFSETS_MAX:
         raise FormatError(
             f"offsets are not pairs, or more than {texr.OFFSETS_MAX}", "chunk TEXR", rule="PYR-48"
+        )
+    if offsets and prod(texr.cells_shape(texture, "grain")) > texr.CELLS_MAX:
+        raise FormatError(
+            f"sources have more than {texr.CELLS_MAX} cells", "chunk TEXR", rule="PYR-48"
         )
 
 

@@ -19,6 +19,9 @@ GRAIN_MAX = 6
 OFFSETS_MAX = 255
 """Most offsets of a texture, so that the number of one, or 0, fits 8 bits."""
 
+CELLS_MAX = 1 << 16
+"""Most cells of sources, which are balanced many times."""
+
 COMPLETED_FROM = (0, 11)
 """First version whose pyramid textures have the fields of `ABSENT`."""
 

@@ -1,8 +1,9 @@
-"""Completion by reference: hidden samples that copy known ones of the view [PYR-48 to PYR-50].
+"""Completion by reference: hidden samples that copy known ones of the view [PYR-48 to PYR-51].
 
 What a figure hides continues what lies around. So cells of the part name offsets, and their samples
-copy what lies there. Cells overlap, as in overlapped block motion compensation, and a smooth
-correction takes the copies to the colours at their rim. All of it is exact in integers.
+copy what lies there. Cells overlap, as in overlapped block motion compensation. Each cell is lifted
+so that neighbours agree in light, and a smooth correction takes the copies to the colours at their
+rim. All of it is exact in integers.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from ..container import texr
 from ..entropy import arrays
 from ..errors import FormatError
 from .diffusion import FRACTION_BITS, Values, diffused
+from .lifts import Copier, lifts_of
 
 FILL_ONE = 255 << FRACTION_BITS
 """Integer that stands for the sample 1.0 where hidden samples are completed and filled."""
@@ -97,7 +99,7 @@ def unpack(fields: Mapping[str, Any], where: str) -> Copies | None:
 
 
 def completed(values: Values, known: Samples, copies: Copies) -> tuple[Values, Samples]:
-    """Completes unknown samples by references to known ones [PYR-49, PYR-50].
+    """Completes unknown samples by references to known ones [PYR-49 to PYR-51].
 
     Args:
         values: int32 [C, H, W] samples in 0..`FILL_ONE`; unknown ones have no influence.
@@ -109,7 +111,8 @@ def completed(values: Values, known: Samples, copies: Copies) -> tuple[Values, S
         arrays that were given.
     """
     flat = known.ravel()
-    at, base = _bases(values, known, copies)
+    copier = Copier(values, known, copies.offsets, copies.sources, 1 << copies.grain)
+    at, base = _bases(values, known, copies, copier, lifts_of(copier))
     inside = flat[at]
     copied, rim = at[~inside], at[inside]
     if not len(copied):
@@ -133,14 +136,17 @@ def _spread(value: Values, known: Samples, wanted: Samples) -> Values:
     return diffused(value, known.reshape(shape), wanted.reshape(shape))
 
 
-def _bases(values: Values, known: Samples, copies: Copies) -> tuple[NDArray[np.int32], Values]:
-    """Finds the samples that have a base, and the bases [PYR-49].
+def _bases(
+    values: Values, known: Samples, copies: Copies, copier: Copier, lifts: Values
+) -> tuple[NDArray[np.int32], Values]:
+    """Finds the samples that have a base, and the bases with what lifts them [PYR-49, PYR-51].
 
     Returns:
         int32 [n] flat numbers of the samples, ascending, and int32 [C, n] bases.
     """
     height, width = known.shape
     cells = np.pad(copies.sources, 1)
+    number = np.pad(copier.number[:-1, :-1], 1, constant_values=-1)
     down, across = (_weights(n, copies.grain) for n in known.shape)
     # Where none of the four cells around a sample has a source, nothing is to be done.
     some = cells > 0
@@ -150,7 +156,8 @@ def _bases(values: Values, known: Samples, copies: Copies) -> tuple[NDArray[np.i
     for top in range(0, height, step):
         rows = down[0][top : top + step]
         y, x = np.nonzero(near[rows].take(across[0], 1))
-        there, base = _base(values, known, copies, cells, (y + top, x), (down, across))
+        place = (y + top, x)
+        there, base = _base(values, known, copies, (cells, number, lifts), place, (down, across))
         places.append(((y + top) * width + x)[there].astype(np.int32))
         bases.append(base)
     return np.concatenate(places), np.concatenate(bases, 1)
@@ -161,7 +168,8 @@ Axis = tuple[NDArray[np.int64], NDArray[np.int32]]
 
 
 def _base(
-    values: Values, known: Samples, copies: Copies, cells: NDArray[np.uint8],
+    values: Values, known: Samples, copies: Copies,
+    cells: tuple[NDArray[np.uint8], NDArray[np.intp], Values],
     place: tuple[NDArray[np.int64], NDArray[np.int64]], axes: tuple[Axis, Axis],
 ) -> tuple[Samples, Values]:  # fmt: skip
     """Bases of the samples at rows and columns `place` [n].
@@ -170,7 +178,8 @@ def _base(
         values: int32 [C, H, W] samples.
         known: bool [H, W], True for known samples.
         copies: The references.
-        cells: uint8 [rows + 2, columns + 2] sources with a border of 0.
+        cells: uint8 [rows + 2, columns + 2] sources with a border of 0, numbers of the cells that
+            have one, likewise, and lifts int32 [C, n] of these.
         place: Rows and columns of the samples.
         axes: Cells and weights down and across.
 
@@ -178,14 +187,16 @@ def _base(
         bool [n], True for those that have a base, and int32 [C, m] bases of these.
     """
     (y, x), (height, width) = place, known.shape
+    sources, numbers, lifts = cells
     whole = np.int32(2 << copies.grain)
-    total, weight = np.zeros((len(values), len(y)), np.int32), np.zeros(len(y), np.int32)
+    weight = np.zeros(len(y), np.int32)
+    total, lifted = np.zeros((2, len(values), len(y)), np.int32)
     seen, flat = known.ravel(), values.reshape(len(values), -1)
     for below, right in product((0, 1), repeat=2):
         (k, f), (m, g) = (
             (number[p], part[p]) for (number, part), p in zip(axes, place, strict=True)
         )
-        source = cells[k + below, m + right]
+        source = sources[k + below, m + right]
         shift = copies.offsets[np.maximum(source, 1) - 1]
         v, u = y + shift[:, 1], x + shift[:, 0]
         used = np.flatnonzero((source > 0) & (v >= 0) & (v < height) & (u >= 0) & (u < width))
@@ -194,10 +205,12 @@ def _base(
         w = (f if below else whole - f)[used] * (g if right else whole - g)[used]
         weight[used] += w
         total[:, used] += w * flat.take(q, 1)
+        lifted[:, used] += w * lifts.take(numbers[(k + below)[used], (m + right)[used]], 1)
     there = weight > 0
-    total, weight = total[:, there], weight[there]
+    total, lifted, weight = total[:, there], lifted[:, there], weight[there]
     # At the coarsest grain weights add up to 2^14, and 2^15 `FILL_ONE` + 2^14 still fits 32 bits.
-    return there, (2 * total + weight) // (2 * weight)
+    base = (2 * total + weight) // (2 * weight)
+    return there, base + (2 * lifted + weight) // (2 * weight)
 
 
 def _weights(count: int, grain: int) -> Axis:

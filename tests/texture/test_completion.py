@@ -1,6 +1,8 @@
 """Hidden samples that come from planes behind, or copy others, against rules done one by one."""
 
+import math
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from proxyimg_codec.errors import FormatError
 from proxyimg_codec.texture import completion
 from proxyimg_codec.texture.completion import DRIFT, FILL_ONE, Copies, completed, unpack
 from proxyimg_codec.texture.diffusion import diffused
+from proxyimg_codec.texture.lifts import LIFT, LIFT_MOST, RIM_WEIGHT, TURNS
 from tests.support.pyramids import planes, view
 
 PART = 7, 4, 21, 18
@@ -27,33 +30,105 @@ def copies(seed, shape, grain, offsets=3, reach=9):
     return Copies(grain, rng.integers(-reach, reach + 1, (offsets, 2)).astype(np.int32), sources)
 
 
-def base_of(values, known, references, j, i):
-    """The base of one sample, or None: the rule with fractions of cells, in plain Python."""
+def copy_of(values, known, references, cell, j, i):
+    """What a cell copies to a sample of the part: a list of components, or None."""
+    n = int(references.sources[cell])
+    if not n or not (0 <= j < known.shape[0] and 0 <= i < known.shape[1]):
+        return None
+    dx, dy = (int(v) for v in references.offsets[n - 1])
+    y, x = j + dy, i + dx
+    if 0 <= y < known.shape[0] and 0 <= x < known.shape[1] and known[y, x]:
+        return [int(v) for v in values[:, y, x]]
+    return None
+
+
+def nearest(a, n):
+    """a / n, halves rounded up."""
+    return math.floor(Fraction(int(a), int(n)) + Fraction(1, 2))
+
+
+def mean_of(pairs):
+    """Bounded mean differences of pairs of lists, or None if there are none."""
+    if not pairs:
+        return None
+    sums = [sum(int(a[c]) - int(b[c]) for a, b in pairs) for c in range(len(pairs[0][0]))]
+    return [min(max(nearest(v, len(pairs)), -LIFT), LIFT) for v in sums]
+
+
+def lifts_by_the_rule(values, known, references):
+    """Lifts of cells, as Python integers, by cell."""
+    side, (rows, columns) = 1 << references.grain, references.sources.shape
+    cells = [(k, m) for k in range(rows) for m in range(columns) if references.sources[k, m]]
+
+    def pairs(one, other, top, left, size):
+        places = [(j, i) for j in range(top, top + size) for i in range(left, left + size)]
+        both = [(one(j, i), other(j, i)) for j, i in places]
+        return [(a, b) for a, b in both if a is not None and b is not None]
+
+    def copies(cell):
+        return lambda j, i: copy_of(values, known, references, cell, j, i)
+
+    def there(j, i):
+        inside = 0 <= j < known.shape[0] and 0 <= i < known.shape[1]
+        return list(values[:, j, i]) if inside and known[j, i] else None
+
+    links, aims = {cell: [] for cell in cells}, {}
+    for k, m in cells:
+        for j, i in ((0, 1), (1, 0)):
+            other = k + j, m + i
+            if other not in links:
+                continue
+            start = k * side + j * (side // 2), m * side + i * (side // 2)
+            found = mean_of(pairs(copies((k, m)), copies(other), *start, side))
+            if found:
+                links[k, m].append((other, [-v for v in found]))
+                links[other].append(((k, m), found))
+        start = k * side - side // 2, m * side - side // 2
+        rim = pairs(there, copies((k, m)), *start, side + 2 * (side // 2))
+        weight = math.ceil(Fraction(RIM_WEIGHT * min(len(rim), side * side), side * side))
+        aims[k, m] = weight, mean_of(rim) or [0] * len(values)
+    lifts = {cell: [0] * len(values) for cell in cells}
+    for turn in range(2 * TURNS):
+        for cell in cells:
+            weight, aim = aims[cell]
+            n = weight + len(links[cell])
+            if sum(cell) % 2 != turn % 2 or not n:
+                continue
+            for c, own in enumerate(lifts[cell]):
+                wanted = weight * aim[c] + sum(lifts[b][c] + more[c] for b, more in links[cell])
+                own += nearest(7 * (wanted - n * own), 4 * n)
+                lifts[cell][c] = min(max(own, -LIFT_MOST), LIFT_MOST)
+    return lifts
+
+
+def base_of(values, known, references, lifts, j, i):
+    """The lifted base of one sample, or None: with fractions of cells, in plain Python."""
     side = 1 << references.grain
     rows, columns = references.sources.shape
-    total, weight = [0] * len(values), 0
+    total, lifted, weight = [0] * len(values), [0] * len(values), 0
     for k in range(rows):
         for m in range(columns):
             down = 2 * side - abs(2 * j + 1 - (2 * k + 1) * side)
             across = 2 * side - abs(2 * i + 1 - (2 * m + 1) * side)
-            n = int(references.sources[k, m])
-            if down <= 0 or across <= 0 or n == 0:
+            found = copy_of(values, known, references, (k, m), j, i)
+            if down <= 0 or across <= 0 or found is None:
                 continue
-            dx, dy = (int(v) for v in references.offsets[n - 1])
-            y, x = j + dy, i + dx
-            if 0 <= y < known.shape[0] and 0 <= x < known.shape[1] and known[y, x]:
-                weight += down * across
-                total = [
-                    t + down * across * int(v[y, x]) for t, v in zip(total, values, strict=True)
-                ]
-    return [(2 * t + weight) // (2 * weight) for t in total] if weight else None
+            weight += down * across
+            total = [t + down * across * v for t, v in zip(total, found, strict=True)]
+            more = lifts[k, m]
+            lifted = [t + down * across * v for t, v in zip(lifted, more, strict=True)]
+    if not weight:
+        return None
+    both = zip(total, lifted, strict=True)
+    return [nearest(t, weight) + nearest(g, weight) for t, g in both]
 
 
 def by_the_rule(values, known, references):
     """What `completed` does, sample by sample."""
     out, now = values.copy(), known.copy()
     places = [(j, i) for j in range(known.shape[0]) for i in range(known.shape[1])]
-    bases = {p: base_of(values, known, references, *p) for p in places}
+    lifts = lifts_by_the_rule(values, known, references)
+    bases = {p: base_of(values, known, references, lifts, *p) for p in places}
     bases = {p: b for p, b in bases.items() if b is not None}
     rim = np.zeros_like(known)
     residual = np.zeros_like(values)

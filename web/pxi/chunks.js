@@ -252,6 +252,8 @@ function checkHidden(plans, texr) {
   need(offsets.length % 2 === 0 && offsets.length <= 510, "offsets are not up to 255 pairs");
   need(!offsets.length === !sources.length, "sources or offsets without the other");
   need(offsets.length || !grain, "a grain without sources");
+  const cells = Math.ceil(part[2] / 2 ** grain) * Math.ceil(part[3] / 2 ** grain);
+  need(!offsets.length || cells <= 65536, "too many cells of sources");
 }
 
 /** CHK-3. */

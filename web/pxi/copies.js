@@ -1,4 +1,4 @@
-/** Chapter 8, "What lies behind": samples that copy others of their part (PYR-48 to PYR-50). */
+/** Chapter 8, "What lies behind": samples that copy others of their part (PYR-48 to PYR-51). */
 
 import { decodeArray } from "./entropy.js";
 import { need } from "./errors.js";
@@ -9,6 +9,9 @@ export const FILL_ONE = 65280;
 
 /** The largest correction of a copy. */
 const DRIFT = 3072;
+
+/** The largest difference of copies that counts, the largest lift, and the rounds of balancing. */
+const [LIFT, LIFT_MOST, TURNS] = [6144, 32640, 64];
 
 /** The array of sources: channels, rows, columns and bits (PYR-48). */
 export function sourcesShape({ part, grain, offsets }) {
@@ -37,22 +40,92 @@ function beside(count, side) {
   });
 }
 
+/** a / n, rounded to the nearest integer, for n > 0. */
+const quotient = (a, n) => Math.floor((2 * a + n) / (2 * n));
+
+/** Where a cell copies the sample (y, x) of the part from, or -1 (PYR-49). */
+function placeOf({ part, offsets }, source, known, y, x) {
+  const [, , w, h] = part;
+  if (!source || x < 0 || x >= w || y < 0 || y >= h) return -1;
+  const [u, v] = [x + offsets[2 * source - 2], y + offsets[2 * source - 1]];
+  return u >= 0 && u < w && v >= 0 && v < h && known[v * w + u] ? v * w + u : -1;
+}
+
+/** The lifts of all cells, one array a component (PYR-51). */
+function liftsOf(texr, sources, values, known) {
+  const [, , w, h] = texr.part;
+  const side = 2 ** texr.grain;
+  const [rows, columns] = [h, w].map((n) => Math.ceil(n / side));
+  const half = Math.floor(side / 2);
+  const mean = (sum, n) => (n ? clamp(quotient(sum, n), -LIFT, LIFT) : 0);
+  /** Sums of the differences of two values at the samples of a square, and their number. */
+  const compare = (top, left, size, pair) => {
+    const sums = values.map(() => 0);
+    let count = 0;
+    for (let y = top; y < top + size; y++) {
+      for (let x = left; x < left + size; x++) {
+        const [one, other] = pair(y, x);
+        if (one < 0 || other < 0) continue;
+        count++;
+        values.forEach((value, c) => (sums[c] += value[one] - value[other]));
+      }
+    }
+    return [sums.map((sum) => mean(sum, count)), count];
+  };
+  const cells = [...sources.keys()].filter((k) => sources[k]);
+  const links = new Map(cells.map((k) => [k, []]));
+  const aims = new Map();
+  for (const k of cells) {
+    const [row, column] = [Math.floor(k / columns), k % columns];
+    const copy = (cell, y, x) => placeOf(texr, sources[cell], known, y, x);
+    for (const [j, i] of [[0, 1], [1, 0]]) {
+      const other = k + j * columns + i;
+      if (row + j >= rows || column + i >= columns || !sources[other]) continue;
+      const [found, count] = compare(row * side + j * half, column * side + i * half, side,
+        (y, x) => [copy(k, y, x), copy(other, y, x)]);
+      if (!count) continue;
+      links.get(k).push([other, found]);
+      links.get(other).push([k, found.map((m) => -m)]);
+    }
+    const [aim, count] = compare(row * side - half, column * side - half, 2 * side - (side % 2),
+      (y, x) => [y >= 0 && y < h && x >= 0 && x < w && known[y * w + x] ? y * w + x : -1, copy(k, y, x)]);
+    aims.set(k, [aim, Math.ceil((4 * Math.min(count, side * side)) / (side * side))]);
+  }
+  const lifts = values.map(() => new Int32Array(sources.length));
+  for (let turn = 0; turn < 2 * TURNS; turn++) {
+    for (const k of cells) {
+      if ((Math.floor(k / columns) + (k % columns)) % 2 !== turn % 2) continue;
+      const [aim, weight] = aims.get(k);
+      const n = weight + links.get(k).length;
+      if (!n) continue;
+      lifts.forEach((lift, c) => {
+        const wanted = links.get(k).reduce((sum, [b, m]) => sum + lift[b] - m[c], weight * aim[c]);
+        const more = Math.floor((7 * (wanted - n * lift[k]) + 2 * n) / (4 * n));
+        lift[k] = clamp(lift[k] + more, -LIFT_MOST, LIFT_MOST);
+      });
+    }
+  }
+  return lifts;
+}
+
 /**
- * The samples that have a base, and their bases (PYR-49).
+ * The samples that have a base, and their bases with what lifts them (PYR-49, PYR-51).
  *
  * `values` are components [h, w] in 1/65280, `known` marks their samples.
  */
-function basesOf({ part, grain, offsets }, sources, values, known) {
-  const [, , w, h] = part;
-  const side = 2 ** grain;
+function basesOf(texr, sources, values, known) {
+  const [, , w, h] = texr.part;
+  const side = 2 ** texr.grain;
+  const lifts = liftsOf(texr, sources, values, known);
   const [rows, columns] = [h, w].map((n) => Math.ceil(n / side));
   const [down, across] = [beside(h, side), beside(w, side)];
   const there = new Uint8Array(w * h);
   const bases = values.map(() => new Int32Array(w * h));
-  const sums = new Float64Array(values.length);
+  const [sums, lifted] = [0, 1].map(() => new Float64Array(values.length));
   for (let y = 0, i = 0; y < h; y++) {
     for (let x = 0; x < w; x++, i++) {
       sums.fill(0);
+      lifted.fill(0);
       let total = 0;
       for (let corner = 0; corner < 4; corner++) {
         const [j, g] = down[y];
@@ -60,16 +133,18 @@ function basesOf({ part, grain, offsets }, sources, values, known) {
         const [row, column] = [j - 1 + (corner >> 1), k - 1 + (corner & 1)];
         if (row < 0 || row >= rows || column < 0 || column >= columns) continue;
         const weight = (corner >> 1 ? g : 2 * side - g) * (corner & 1 ? f : 2 * side - f);
-        const source = sources[row * columns + column];
-        if (!weight || !source) continue;
-        const [u, v] = [x + offsets[2 * source - 2], y + offsets[2 * source - 1]];
-        if (u < 0 || u >= w || v < 0 || v >= h || !known[v * w + u]) continue;
+        const cell = row * columns + column;
+        const place = placeOf(texr, sources[cell], known, y, x);
+        if (!weight || place < 0) continue;
         total += weight;
-        for (let c = 0; c < sums.length; c++) sums[c] += weight * values[c][v * w + u];
+        for (let c = 0; c < sums.length; c++) {
+          sums[c] += weight * values[c][place];
+          lifted[c] += weight * lifts[c][cell];
+        }
       }
       if (!total) continue;
       there[i] = 1;
-      bases.forEach((base, c) => (base[i] = Math.floor((2 * sums[c] + total) / (2 * total))));
+      bases.forEach((base, c) => (base[i] = quotient(sums[c], total) + quotient(lifted[c], total)));
     }
   }
   return { there, bases };

@@ -91,13 +91,13 @@ def _many(b: Base) -> bytes:
     ])  # fmt: skip
 
 
-def _large(size: list[int], offsets: int) -> Callable[[Base], bytes]:
+def _large(size: list[int]) -> Callable[[Base], bytes]:
     """Builder of a file with sources for each sample of a raster."""
 
     def build(b: Base) -> bytes:
         chunks = list(b.chunks)
         chunks[3] = different(b, 3, size=size, support=b"")
-        texture = {"part": [0, 0, *size], "cell": 6, "offsets": [1, 1] * offsets}
+        texture = {"part": [0, 0, *size], "cell": 6, "offsets": [1, 1]}
         chunks[5] = different(b, 5, **texture, sources=stream())
         return write(chunks)
 
@@ -155,9 +155,7 @@ _BEHIND: list[Row] = [
 ]
 
 _LIMITS: list[Row] = [
-    ("limit-sources", "sources of 2^23 cells and some", "", _large([1 << 12, 2049], 1)),
-    ("limit-sources-upper", "sources of 2^22 cells and some, with upper bits", "",
-     _large([1 << 11, 2049], 16)),
+    ("invalid-copies-grid", "sources of 2^16 cells and some", "PYR-48", _large([1 << 8, 257])),
     ("limit-filled-copies", "five layers of 2^24 samples that have to be copied and filled", "",
      _many),
 ]

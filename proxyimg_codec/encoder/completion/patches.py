@@ -46,7 +46,7 @@ Places = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Guess:
-    """What a hole may look like.
+    """Guess of what a hole looks like.
 
     Attributes:
         features: float32 [H, W, 5] colours in 0..255 and sizes of gradients across and down, times

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ...container.texr import GRAIN_MAX
+from ...container.texr import CELLS_MAX, GRAIN_MAX
 from ...texture.completion import Copies
 from ...texture.network import Floats
 from .membrane import KNOWN, continued
@@ -87,7 +87,10 @@ def references(
     if not len(y):
         return None
     shape, grain = known.shape, 2
-    while grain < GRAIN_MAX and int(blocks(wanted, 1 << grain).sum()) > CELLS:
+    while grain < GRAIN_MAX:
+        some = blocks(wanted, 1 << grain)
+        if some.sum() <= CELLS and some.size <= CELLS_MAX:
+            break
         grain += 1
     margin = max(int(y[-1] - y[0]), int(x[-1] - x[0]), 64) + 1
     unit = 1 << grain

@@ -96,5 +96,6 @@ def test_nothing_red_is_left_of_a_red_parrot(data_dir):
     for left, place in ((gone, grown(parrot.mask, 3)), (hidden, inside)):
         assert (left[place] > most).mean() < 0.001
         assert left[place].max() < most + 20
-        assert abs(left[place].mean() - before[around].mean()) < 1.5
+        # What is copied may be of one part of what is around, such as the brown trunk.
+        assert abs(left[place].mean() - before[around].mean()) < 8
     assert gone[parrot.mask].max() < most + 5
