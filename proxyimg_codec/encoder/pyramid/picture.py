@@ -20,7 +20,7 @@ from ...texture.planes import Planes, cells_of
 from ...texture.pyramid import PyramidTexture
 from ..completion.behind import Source, pixels_behind
 from ..completion.hidden import copies_of
-from ..completion.membrane import continued
+from ..completion.membrane import KNOWN, continued
 from ..settings import Settings
 from ..shapes.coverage import coverage_of
 from ..shapes.layers import Plan
@@ -77,26 +77,25 @@ def encode_picture(
         _view(boundaries, k, coverage_of(boundary, width, height).reshape(height, width))
         for k, boundary in enumerate(boundaries)
     ]
-    structural = settings.tune == "ms-ssim"
-    rasters = [colour_of(picture)._replace(structural=structural)]
+    rasters = [colour_of(picture)._replace(structural=settings.tune == "ms-ssim")]
     if plan.channels == 4:
         rasters.append(alpha_of(picture[..., 3]))
     shared = len(rasters)
-    own = None if behind is None else _behind(rasters[0], views[0][1], behind)
-    if own is not None:
-        rasters.append(own._replace(structural=structural))
+    own = [] if behind is None else _behind(rasters, views[0][1], behind)
+    rasters += own
     copies = [
-        None if own is not None and k == 0 else copies_of(picture, cuts, settings)
+        None if own and k == 0 else copies_of(picture, cuts, settings)
         for k, (_, cuts) in enumerate(views)
     ]
 
     def picture_of(sources: Sequence[Planes]) -> Picture:
         alpha = sources[1] if shared > 1 else None
-        more = None if own is None else sources[shared]
+        hidden, alpha_of_hidden = (*sources[shared:], None, None)[:2]
         layers = [
             Layer(v.name, box, v.boundary,
-                  PyramidTexture(sources[0], alpha, box, cuts=cuts, behind=None if k else more,
-                                 copies=copies[k]), v.mesh, parent=v.parent)
+                  PyramidTexture(sources[0], alpha, box, cuts=cuts, behind=None if k else hidden,
+                                 behind_alpha=None if k else alpha_of_hidden, copies=copies[k]),
+                  v.mesh, parent=v.parent)
             for k, (v, (box, cuts)) in enumerate(zip(plan.layers, views, strict=True))
         ]  # fmt: skip
         return Picture(width, height, plan.channels, plan.opaque, 8, Layers(layers), (),
@@ -262,21 +261,30 @@ def alpha_of(alpha: Floats) -> Raster:
     return Raster(np.repeat(alpha[..., None] * np.float32(255), 3, 2), None, None, True)
 
 
-def _behind(colour: Raster, cuts: Occlusion | None, source: Source) -> Raster | None:
-    """Makes a raster of the hidden pixels of the back layer; None if nothing of it is hidden.
+def _behind(rasters: Sequence[Raster], cuts: Occlusion | None, source: Source) -> list[Raster]:
+    """Makes rasters of the hidden pixels of the back layer; none if nothing of it is hidden.
 
     Args:
-        colour: Raster of the picture.
+        rasters: Rasters of the colour of the picture, and of its alpha if it has planes.
         cuts: Cuts of the back layer.
         source: What gives the pixels.
+
+    Returns:
+        The raster of colour, and if there is one of alpha, one that continues it.
     """
-    found = pixels_behind(colour.samples / np.float32(255), cuts, source)
-    if found is None:
-        return None
+    found = pixels_behind(rasters[0].samples / np.float32(255), cuts, source)
+    if found is None or cuts is None:
+        return []
     pixels, hidden = found
-    samples = pixels * np.float32(255)
-    grey = colour.grey and bool((samples == samples[..., :1]).all())
-    return Raster(samples, hidden.astype(np.float32), _cells(hidden), grey)
+    samples, weight, cells = pixels * np.float32(255), hidden.astype(np.float32), _cells(hidden)
+    grey = rasters[0].grey and bool((samples == samples[..., :1]).all())
+    made = [rasters[0]._replace(samples=samples, weight=weight, cells=cells, grey=grey)]
+    x, y, width, height = cuts.box
+    for alpha in rasters[1:]:
+        part = alpha.samples[y : y + height, x : x + width]
+        whole = continued(part, np.where(cuts.trusted, np.float32(KNOWN), np.float32(0)))
+        made.append(Raster(np.clip(whole, 0, 255), weight, cells, True))
+    return made
 
 
 def _cells(mask: NDArray[np.bool_]) -> NDArray[np.bool_] | None:

@@ -101,6 +101,20 @@ def test_grey_and_colour_may_lie_behind_each_other():
     assert psnr_8bit(without()[INSIDE], revealed(image)[INSIDE]) > 30
 
 
+def test_what_lies_behind_translucent_parts_is_as_translucent():
+    """The picture is faint below; the object is opaque, and hides all but the last columns."""
+    alpha = np.where(Y < 40, 255, 100).astype(np.uint8)
+    pixels = np.dstack([picture(), np.where(OBJECT, np.uint8(255), alpha)])
+    image = encoded(pixels, masks={"back": np.ones_like(OBJECT), "box": OBJECT}, behind=without())
+    texture = image.layers["back"].texture
+    assert texture.behind_alpha.components == 1
+    shown = revealed(image)
+    assert psnr_8bit(without()[28:35, 30:70], shown[28:35, 30:70, :3]) > 28
+    assert np.abs(shown[..., 3].astype(int) - alpha)[:, :20].max() < 25
+    rim = shown[50:60, 77, 3]  # beside the object
+    assert (abs(rim.astype(int) - 100) < 25).all()
+
+
 def test_a_picture_of_one_colour_may_hide_something():
     flat = np.full((HEIGHT, WIDTH, 3), 99, np.uint8)
     image = encoded(flat, behind=without())
