@@ -44,6 +44,9 @@ UNKNOWN = 2e4
 FAR = 3 * 60.0**2
 """Squared difference from which on it does not matter how large it is."""
 
+LARGE = 1 << 21
+"""Pixels above which sizes of gradients are those of a reduced picture, to save memory."""
+
 TURNS = 15
 """Rounds of belief propagation."""
 
@@ -96,9 +99,12 @@ def references(
     unit = 1 << grain
     top, left = max(y[0] - margin, 0) // unit * unit, max(x[0] - margin, 0) // unit * unit
     part = np.s_[top : y[-1] + margin, left : x[-1] + margin]
-    features, seen, hole = features_of(colours[part], known[part]), known[part], wanted[part]
-    for _ in range(grain - 2):
-        features, seen, hole = halved(features, True), halved(seen, True), halved(hole, False)
+    features, seen, hole = colours[part], known[part], wanted[part]
+    for level in range(grain - 1):
+        if level:
+            features, seen, hole = halved(features, True), halved(seen, True), halved(hole, False)
+        if features.shape[2] == 3 and (seen.size <= LARGE or level == grain - 2):
+            features = features_of(features, seen)
     hole &= ~seen
     if not hole.any() or not whole(seen).any() or not (always or _is_busy(features, seen, hole)):
         return None
