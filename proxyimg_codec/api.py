@@ -309,6 +309,7 @@ def encode(
     *,
     masks: Masks | None = None,
     blocks: Mapping[str, bytes] | None = None,
+    behind: NDArray[Any] | None = None,
     progress: Progress | None = None,
     **options: Any,
 ) -> Image:
@@ -324,6 +325,8 @@ def encode(
             a dict by name or in an array [N, H, W]; or one array [H, W] of labels, 0 is the back.
         blocks: Metadata blocks to carry: ``icc`` and ``cicp``, which say what colours these are,
             ``exif`` and ``xmp``; `io.raster.read` gives those of a file.
+        behind: The picture without its objects, as `pixels`, of the same size and colours, and
+            opaque: what shows of the back layer when others are moved. Pyramid only.
         progress: Called with the name of a stage, and its numbers of units done and in all.
         options: Fields of `Settings` that replace those of `settings`, such as ``quality=70``.
 
@@ -331,8 +334,8 @@ def encode(
         The picture as a reader will decode it.
 
     Raises:
-        InputError: The array cannot be a picture, or a mask is none or does not fit it.
-        UsageError: A setting is out of range.
+        InputError: An array cannot be a picture, or a mask or `behind` does not fit it.
+        UsageError: A setting is out of range, or `behind` contradicts one.
         UnsupportedError: A package that is needed is not installed.
         LimitError: The picture is larger than readers accept by default, or than memory.
 
@@ -350,5 +353,13 @@ def encode(
             f"encode needs {error.name}: pip install 'proxyimg-codec[encode]'"
         ) from None
     return Image(
-        encoder.encode(pixels, settings, masks=masks, blocks=blocks, progress=progress, **options)
+        encoder.encode(
+            pixels,
+            settings,
+            masks=masks,
+            blocks=blocks,
+            behind=behind,
+            progress=progress,
+            **options,
+        )
     )

@@ -29,6 +29,7 @@ KINDS = {
     "training": ("encoder", ENCODE),
     "benchmarks": ("encoder", ENCODE),
     "bench": ("encoder", (*ENCODE, "matplotlib")),
+    "cli/test_behind_cli.py": ("encoder", ENCODE),
     "cli/test_colour_cli.py": ("encoder", ENCODE),
     "cli/test_encode_cli.py": ("encoder", ENCODE),
     "cli/test_models_cli.py": ("encoder", ENCODE),

@@ -46,6 +46,7 @@ def folder(tmp_path_factory):
     psd_tools = pytest.importorskip("psd_tools")
     path = tmp_path_factory.mktemp("docs")
     raster.write(path / "photo.png", smooth(96, 64))
+    raster.write(path / "without.png", smooth(96, 64)[::-1])
     (path / "masks" / "cat").mkdir(parents=True)
     mask = disc(96, 64)
     low = np.zeros_like(mask)
@@ -71,6 +72,7 @@ def folder(tmp_path_factory):
     (path / "breathe.json").write_text(blocks("docs/guide/animation.md", "json")[0])
     onnx_models.write(path / "u2netp.onnx", onnx_models.figures())
     onnx_models.write(path / "depth.onnx", onnx_models.depth())
+    onnx_models.write(path / "lama.onnx", onnx_models.inpainting("64, 64", 255))
     edits = [{"op": "move", "layer": "cat", "by": [3, 4]}]
     (path / "edits.json").write_text(json.dumps({"version": 1, "edits": edits}))
     return path

@@ -91,10 +91,12 @@ def _add_decomposition(p: argparse.ArgumentParser) -> None:
     add_prompts(p)
     add("--boundary", choices=["lsq", "chamfer"], help="boundary fit: least squares "
         "(default), or the slower adaptive Chamfer fit of the paper")  # fmt: skip
-    add("--background", choices=["auto", "smooth", "exemplar", "complete", "none", "diffuse"],
-        default="auto", help="hidden parts of layers: continued smoothly (also diffuse), copied "
-        "from what is around (pyramid), whichever suits (auto, the default), optimized and stored "
-        "(complete, implicit), or nothing is stored")  # fmt: skip
+    add("--background", metavar="HOW", default="auto", help="hidden parts of layers: smooth (also "
+        "diffuse); exemplar: copied from what is around (pyramid); auto: the better one (default); "
+        "complete: optimized and stored (implicit); none: nothing is stored; or a model that "
+        "inpaints: an ONNX file, or a name of pxi-models")  # fmt: skip
+    add("--behind", metavar="FILE", help="the picture without its objects, of the same size: what "
+        "the back layer shows where they were; pyramid")  # fmt: skip
     add("--mesh", metavar="NAME", help="who makes proxy nodes: delaunay (default with texture "
         "implicit), triwild, ftetwild, or none (default with pyramid: edits make "
         "them)")  # fmt: skip
@@ -144,8 +146,8 @@ def check(args: argparse.Namespace) -> None:
     """
     from ..errors import UsageError
 
-    check_names(args.masks)
-    one = [name for name in ("masks", *FLAGS) if getattr(args, name) is not None]
+    check_names(args.masks, args.behind, args.background)
+    one = [name for name in ("masks", "behind", *FLAGS) if getattr(args, name) is not None]
     if one and len(args.inputs) > 1:
         raise UsageError(f"--{one[0]}: belongs to one picture; encode each by itself")
     settings_from(args)
@@ -165,7 +167,7 @@ def encode_file(args: argparse.Namespace) -> None:
         raise UsageError("--json and a picture cannot both go to standard output")
     check_suffix(output, args.force_suffix, "name it so, give several pictures a folder with -o")
     beside = [*files_in(args.masks), *(files_in(args.input) if args.stack else ())]
-    check_target(output, args.force, *args.inputs, *beside, args.scribble)
+    check_target(output, args.force, *args.inputs, *beside, args.scribble, args.behind)
     settings = settings_from(args)
 
     from ..codec.read import from_bytes
@@ -249,13 +251,38 @@ def encoded(source: bytes, args: argparse.Namespace, settings: Any, bar: Bar) ->
     masks = None if args.masks is None else load_masks(args.masks, width, height)
     if pointed(args):
         masks = found_layers(picture.pixels, args, settings.jobs)
-    image = encode(picture.pixels, settings, masks=masks, blocks=picture.blocks, progress=progress)
+    behind = None if args.behind is None else picture_behind(args, picture)
+    image = encode(
+        picture.pixels, settings, masks=masks, blocks=picture.blocks,
+        behind=None if behind is None else behind.pixels, progress=progress,
+    )  # fmt: skip
     notes = [*picture.notes]
+    notes += [] if behind is None else [f"{args.behind}: {note}" for note in behind.notes]
     if masks is None and settings.max_layers > 1 and len(image.layers) == 1:
         notes.append("no object was found: one layer; point at what is to be one (--point)")
     for note in () if args.quiet else notes:
         print(f"pxi-encode: warning: {printable(name)}: {note}", file=sys.stderr)
     return image, picture.pixels
+
+
+def picture_behind(args: argparse.Namespace, picture: Any) -> Any:
+    """Reads the picture of --behind, in the colours of the input.
+
+    Args:
+        args: The parsed command line.
+        picture: The input, a `raster.Picture`.
+
+    Raises:
+        PxiError: It cannot be read, or its colours cannot be converted.
+    """
+    from ..errors import UnsupportedError
+    from ..io.raster import matched, read
+
+    behind = read(args.behind, clip=args.tone == "clip")
+    try:
+        return matched(behind, picture.blocks)
+    except UnsupportedError as error:
+        raise UnsupportedError(f"{args.behind}: {error}") from None
 
 
 def target(args: argparse.Namespace) -> str:
@@ -272,6 +299,8 @@ def settings_from(args: argparse.Namespace) -> Any:
     from ..encoder.settings import PRESETS, Settings
     from ..errors import UsageError
 
+    if args.behind is not None and args.background != "auto":
+        raise UsageError("--behind and --background contradict each other")
     if args.quality is not None:
         aims = [n for n in ("target_bpp", "target_size", "target_psnr") if getattr(args, n)]
         if aims:

@@ -46,6 +46,8 @@ def layered_input(source: bytes, name: str, args: argparse.Namespace) -> Any:
     flat = args.background != "auto" or given(args)
     if not is_photoshop(source) or flat:
         return None
+    if args.behind is not None:
+        refuse_for_layers(args)
     if not has_reader():
         warn(args, name, "it is taken flat; pip install 'proxyimg-codec[psd]' to keep its layers")
         return None
@@ -70,8 +72,9 @@ def refuse_for_layers(args: argparse.Namespace) -> None:
 
     for flag in given(args):
         raise UsageError(f"{flag}: the input has layers of its own, which are kept")
-    if args.background != "auto":
-        raise UsageError("--background: the layers of the input hide nothing unknown")
+    for name in ("background", "behind"):
+        if getattr(args, name) not in ("auto", None):
+            raise UsageError(f"--{name}: the layers of the input hide nothing unknown")
 
 
 def encoded_layers(

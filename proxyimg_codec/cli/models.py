@@ -1,4 +1,4 @@
-"""pxi-models: lists models of other projects that find layers, checks and downloads them."""
+"""pxi-models: lists models of other projects, checks and downloads them."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ USES = {
     "sam": "pxi-encode --segmenter {}",
     "saliency": "pxi-encode --segmenter {}",
     "depth": "pxi-encode --depth {}",
+    "inpainting": "pxi-encode --background {}",
 }
 """How a model for a purpose is used."""
 
@@ -27,8 +28,8 @@ def arguments() -> argparse.ArgumentParser:
     """Parser of the command line."""
     p = parser(
         "pxi-models",
-        "List models of other projects that find layers and depth, check and download them.\n"
-        "Nothing is downloaded but by `pxi-models get NAME`.",
+        "List models of other projects that find layers, depth or what lies behind, check and\n"
+        "download them. Nothing is downloaded but by `pxi-models get NAME`.",
     )
     p.add_argument("--json", action="store_true", help="print JSON")
     actions = p.add_subparsers(dest="action", metavar="ACTION", title="actions")
@@ -64,11 +65,11 @@ def list_models(args: argparse.Namespace) -> None:
         places = [str(folder) for folder in folders()]
         print(json.dumps({"folders": places, "models": facts}, indent=2))
         return
-    print(f"{'name':24} {'for':9} {'size':>8}  {'licence':14} here")
+    print(f"{'name':24} {'for':10} {'size':>8}  {'licence':14} here")
     for f in facts:
         sizes = [file["bytes"] for file in f["files"]]
         size = "unknown" if None in sizes else f"{sum(sizes) / 1e6:.0f} MB"
-        print(f"{f['name']:24} {f['for']:9} {size:>8}  {f['licence']:14} {_state(f)}")
+        print(f"{f['name']:24} {f['for']:10} {size:>8}  {f['licence']:14} {_state(f)}")
         print(f"    {f['about']}; {f['project']}")
         for file in f["files"]:
             print(f"    {file['address']}")

@@ -20,6 +20,7 @@ from ..limits import DEFAULT_LIMITS, enough_memory
 from ..model import Layer, Layers, Picture
 from ..texture.implicit import ImplicitTexture
 from ..texture.network import Floats, NetShape, Network
+from .completion.behind import source_of
 from .completion.occluded import extended
 from .implicit import fit, node_problem
 from .implicit.fit_problem import Problem, build
@@ -54,6 +55,7 @@ def encode(
     *,
     masks: Masks | None = None,
     blocks: Mapping[str, bytes] | None = None,
+    behind: NDArray[Any] | None = None,
     progress: Progress | None = None,
     **options: Any,
 ) -> Picture:
@@ -70,6 +72,8 @@ def encode(
             0, 1, 2, ... of which 0 is the back.
         blocks: Metadata blocks to carry: ``icc`` and ``cicp``, which say what colours these are,
             ``exif`` and ``xmp``; `io.raster.read` gives those of a file.
+        behind: The picture without its objects, as `pixels`, of the same size and colours, and
+            opaque: what shows of the back layer when others are moved. Pyramid only.
         progress: Called with the name of a stage, and its numbers of units done and in all.
         options: Fields of `Settings` that replace those of `settings`, such as ``quality=70``.
 
@@ -77,9 +81,10 @@ def encode(
         The picture as a reader will decode it.
 
     Raises:
-        InputError: The array cannot be a picture, a mask does not fit it, or a mesher fails.
-        UsageError: A setting or metadata block is invalid, or a target size or PSNR is out of
-            reach.
+        InputError: An array cannot be a picture, a mask or `behind` does not fit it, or a mesher
+            or a model fails.
+        UsageError: A setting or metadata block is invalid, `behind` contradicts a setting, or a
+            target size or PSNR is out of reach.
         UnsupportedError: A package that is needed is not installed.
         LimitError: The picture is larger than readers accept by default, or needs more memory than
             there is.
@@ -89,15 +94,17 @@ def encode(
     picture, depth = to_float(np.asarray(pixels))
     DEFAULT_LIMITS.check("side", max(picture.shape[:2]))
     check_blocks(blocks or {})
-    regions = None if masks is None else regions_of(masks, *picture.shape[:2])
+    height, width = picture.shape[:2]
+    source = source_of(behind, settings, width, height)
+    regions = None if masks is None else regions_of(masks, height, width)
     plan = _planned(picture, settings, regions, report)
     premultiplied = picture.copy()
     premultiplied[..., :3] *= picture[..., 3:]
     plan = with_meshes(premultiplied, plan, settings)
-    if settings.pyramid and not plain(premultiplied):
+    if settings.pyramid and (behind is not None or not plain(premultiplied)):
         from .pyramid.picture import encode_picture
 
-        image = encode_picture(picture, plan, settings, report)
+        image = encode_picture(picture, plan, settings, report, source)
     else:
         image = _with_network(premultiplied, plan, settings, report)
     return replace(image, depth=depth, blocks=dict(blocks or {}))

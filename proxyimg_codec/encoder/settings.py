@@ -74,7 +74,9 @@ class Settings:
             smoothly; ``exemplar`` copies what is around, pyramid only; ``auto`` is exemplar for
             pyramids where surroundings are not smooth, and smooth otherwise; ``complete`` stores
             codes that are optimized for smoothness, implicit only; ``none`` stores nothing and
-            learns nothing, so that decoders fill it.
+            learns nothing, so that decoders fill it. Anything else is an inpainter that makes what
+            is hidden of the back layer, as ``auto`` does for others: a plug-in of the kind
+            `inpainters`, or a model as for `segmenter`; pyramid only.
         mesh: Name of the mesher, see `plugins`; ``none`` stores no meshes, and edits make them when
             needed; None = delaunay for implicit textures, else none.
         seed: Seed of all random numbers, 0..2**32 - 1.
@@ -129,7 +131,11 @@ class Settings:
             (self.net_bits is None or 2 <= self.net_bits <= 8, "net_bits", "2..8"),
             (self.sampling in SAMPLINGS, "sampling", " or ".join(SAMPLINGS)),
             (self.boundary in BOUNDARIES, "boundary", " or ".join(BOUNDARIES)),
-            (self.background in BACKGROUNDS, "background", " or ".join(BACKGROUNDS)),
+            (
+                isinstance(self.background, str) and self.background != "",
+                "background",
+                f"{', '.join(BACKGROUNDS)} or an inpainter",
+            ),
             (0 <= self.seed < 1 << 32, "seed", "0..2^32-1"),
             (self.jobs >= 1, "jobs", "at least 1"),
             (self.device in ("cpu", "cuda"), "device", "cpu or cuda"),
@@ -153,7 +159,8 @@ class Settings:
         if len(aims) > 1:
             raise UsageError(f"{' and '.join(aims)} contradict each other")
         aims += ["tune ms-ssim"] if self.tune != "mse" else []
-        aims += ["background exemplar"] if self.background == "exemplar" else []
+        chosen = self.background == "exemplar" or self.inpainter is not None
+        aims += [f"background {self.background}"] if chosen else []
         only = self._implicit_alone()
         if aims and only:
             raise UsageError(f"{only[0]} needs texture implicit, {aims[0]} texture pyramid")
@@ -188,6 +195,11 @@ class Settings:
         if self.texture == "auto":
             return not self._implicit_alone()
         return self.texture == "pyramid"
+
+    @property
+    def inpainter(self) -> str | None:
+        """Name of the inpainter of the background, or None."""
+        return None if self.background in BACKGROUNDS else self.background
 
     @property
     def mesher(self) -> str:
@@ -256,7 +268,7 @@ class Settings:
             for k, v in asdict(self).items()
             if k not in ("jobs", "device") and v != usual.get(k)
         }
-        for name in ("segmenter", "depth"):
+        for name in ("segmenter", "depth", "background"):
             if name in changed:
                 files = changed[name].split(os.pathsep)
                 changed[name] = os.pathsep.join(os.path.basename(file) for file in files)

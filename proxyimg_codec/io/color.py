@@ -328,6 +328,33 @@ def to_srgb(pixels: Pixels, blocks: Mapping[str, bytes]) -> Floats:
     return np.clip(_converted(pixels, blocks, _srgb_profile), 0, 1)
 
 
+def same_colours(blocks: Mapping[str, bytes], others: Mapping[str, bytes]) -> bool:
+    """Whether two pictures with these blocks have the same colours, as far as blocks tell."""
+    return all(blocks.get(name) == others.get(name) for name in COLOUR)
+
+
+def to_colours(pixels: Pixels, blocks: Mapping[str, bytes], target: Mapping[str, bytes]) -> Floats:
+    """Converts pixels to the colours of another picture. Those that it cannot show are clipped.
+
+    Args:
+        pixels: As `to_srgb`.
+        blocks: As `to_srgb`.
+        target: Blocks that say what colours the other picture has.
+
+    Returns:
+        float32 [H, W, 3] or, with alpha, [H, W, 4] in 0..1.
+
+    Raises:
+        UnsupportedError: A profile is damaged, the other picture is of high dynamic range, or
+            imagecodecs is not installed.
+    """
+    icc = target.get("icc") if "cicp" not in target else profile_of(target["cicp"])
+    if not is_srgb(target) and icc is None:
+        raise UnsupportedError("colours cannot be converted to high dynamic range (PQ, HLG)")
+    profile = icc or _srgb_profile()
+    return np.clip(_converted(pixels, blocks, lambda: profile), 0, 1)
+
+
 def to_linear(pixels: Pixels, blocks: Mapping[str, bytes]) -> Floats:
     """Converts pixels to linear light with the primaries of sRGB, perhaps beyond 0..1.
 

@@ -128,6 +128,24 @@ def stripped(picture: Picture) -> Picture:
     return Picture(pixels, {}, (*picture.notes, note))
 
 
+def matched(picture: Picture, blocks: Mapping[str, bytes]) -> Picture:
+    """Returns a picture in the colours of another one, converted if they differ.
+
+    Args:
+        picture: The picture.
+        blocks: Metadata blocks of the other one, of which ``icc`` and ``cicp`` count.
+
+    Raises:
+        UnsupportedError: The colours cannot be converted.
+    """
+    if color.same_colours(picture.blocks, blocks):
+        return picture
+    pixels: Pixels = color.to_colours(picture.pixels, picture.blocks, blocks)
+    kept = {k: v for k, v in blocks.items() if k in color.COLOUR}
+    notes = (*picture.notes, "converted to the colours of the picture")
+    return Picture(pixels, kept, notes)
+
+
 def _which(frame: int, count: int) -> str:
     return (f"it holds {count} pictures, of which number {frame} is taken, counted from 0; "
             "--frame N takes another")  # fmt: skip

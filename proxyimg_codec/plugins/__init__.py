@@ -9,6 +9,8 @@ Kinds:
     segmenters: `(rgb, max_layers, support) -> list[Region]`, as `encoder.shapes.figures.segment`.
     prompters: `(rgb, prompts, jobs=1) -> list[Region]`, as `encoder.shapes.pointing.point_at`.
     depth: `(rgb) -> float32 [H, W]`, larger is nearer; any scale.
+    inpainters: `(picture, hole) -> float32 [H, W, 3]`, both of them in 0..1: the picture with other
+        colours where hole, bool [H, W], is True.
     meshers: `(boundary, size, edge) -> Base`, as `geometry.mesher.delaunay`.
     engines: `(texture, network, taps) -> float32 [N, channels]`, as `render.engines.run_numpy`.
     handles: `(picture) -> Image`: what functions below `api` give to those who call them directly.
@@ -34,6 +36,7 @@ BUILT_IN: dict[str, dict[str, str]] = {
         "sam": "proxyimg_codec.encoder.shapes.external_models.prompting:prompted",
     },
     "depth": {},
+    "inpainters": {},
     "meshers": {
         "delaunay": "proxyimg_codec.geometry.mesher:delaunay",
         "triwild": "proxyimg_codec.encoder.shapes.external_meshers:triwild",

@@ -399,6 +399,7 @@ def test_files_that_are_no_pictures(tool, tmp_path, data):
         ("--boundary", "spline"),
         ("--background", "fog"),
         ("--background", "exemplar", "--texture", "implicit"),
+        ("--background", "none", "--behind", "photo.png"),
         ("--unknown",),
         ("--qual", "50"),
         ("two", "outputs"),

@@ -169,7 +169,12 @@ def test_what_cannot_be_downloaded(tool, cache, server):
 
 
 @pytest.mark.parametrize(
-    ("made", "use"), [(onnx_models.figures, "segmenter"), (onnx_models.depth, "depth")]
+    ("made", "use"),
+    [
+        (onnx_models.figures, "segmenter"),
+        (onnx_models.depth, "depth"),
+        (onnx_models.inpainting, "background"),
+    ],
 )
 def test_models_are_checked_by_running_them(tool, tmp_path, made, use):
     path = onnx_models.write(tmp_path / "m.onnx", made())
@@ -222,4 +227,4 @@ def test_the_real_catalogue_is_sound():
         assert file.address.startswith("https://")
         assert file.address.endswith(f"/{file.name}")
         assert file.sha256 is None or len(bytes.fromhex(file.sha256)) == 32
-    assert {e.purpose for e in catalogue.ENTRIES} == {"sam", "saliency", "depth"}
+    assert {e.purpose for e in catalogue.ENTRIES} == {"sam", "saliency", "depth", "inpainting"}

@@ -59,6 +59,37 @@ def depth(height: str = "h", width: str = "w", four: bool = False) -> bytes:
     )
 
 
+def inpainting(side: str = "", most: float = 1.0, blur: int = 31) -> bytes:
+    """LaMa: means of what is around a place and not in the hole; other colours by one half.
+
+    Args:
+        side: Height and width, as in ``"512, 512"``; if empty they are free, in multiples of 8.
+        most: What white is.
+        blur: Side of the square of which the mean is taken, an odd number.
+    """
+    size = side or "h, w"
+    square, pads = [blur] * 2, [blur // 2] * 4
+    pool = f"AveragePool<kernel_shape = {square}, pads = {pads}, count_include_pad = 1>"
+    return model(
+        f"""agraph (float[b, 3, {size}] image, float[b, 1, {size}] mask)
+            => (float[b, 3, H, W] output) {{
+            patches = SpaceToDepth<blocksize = 8>(image)
+            same = DepthToSpace<blocksize = 8>(patches)
+            seen = Sub(one, mask)
+            total = {pool}(same)
+            count = {pool}(seen)
+            weight = Max(count, least)
+            mean = Div(total, weight)
+            inside = Mul(mean, mask)
+            half = Mul(same, middle)
+            all = Add(inside, half)
+            output = Mul(all, most)
+        }}""",
+        one=np.float32([1]), least=np.float32([1e-6]), middle=np.float32([0.5]),
+        most=np.float32([most]),
+    )  # fmt: skip
+
+
 EMBED = np.eye(256, 3, dtype=np.float32).reshape(256, 3, 1, 1)
 
 

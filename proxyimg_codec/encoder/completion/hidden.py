@@ -6,7 +6,7 @@ import numpy as np
 
 from ...texture.completion import Copies
 from ...texture.network import Floats
-from ...texture.occlusion import Occlusion
+from ...texture.occlusion import Occlusion, Samples
 from ..settings import Settings
 from .references import references
 
@@ -25,14 +25,26 @@ def copies_of(picture: Floats, cuts: Occlusion | None, settings: Settings) -> Co
     Returns:
         The references, or None if a smooth fill is wanted or as good, or nothing can be copied.
     """
-    if cuts is None or not cuts.fronts or settings.background not in ("auto", "exemplar"):
+    if cuts is None or not cuts.fronts or settings.background in ("smooth", "complete", "none"):
         return None
     x, y, width, height = cuts.box
     part = picture[y : y + height, x : x + width]
-    bare = Occlusion(None, cuts.fronts, cuts.box)
-    inside = Occlusion(cuts.own, (), cuts.box).shown
-    known = cuts.trusted & bare.trusted
-    wanted = inside & ~bare.trusted & ~known
+    known, wanted = hidden_in(cuts)
     colours = np.ascontiguousarray(part[..., :3] * np.float32(255))
     always = settings.background == "exemplar"
     return references(colours, known & (part[..., 3] >= OPAQUE), wanted, settings.seed, always)
+
+
+def hidden_in(cuts: Occlusion) -> tuple[Samples, Samples]:
+    """Finds what is hidden of a view: the samples of its shape that others cover or are mixed into.
+
+    Args:
+        cuts: Cuts of the view.
+
+    Returns:
+        bool [height, width], True for samples that may be copied; and likewise for hidden ones.
+    """
+    bare = Occlusion(None, cuts.fronts, cuts.box)
+    inside = Occlusion(cuts.own, (), cuts.box).shown
+    known = cuts.trusted & bare.trusted
+    return known, inside & ~bare.trusted & ~known

@@ -111,7 +111,10 @@ def encode(
     random = torch.Generator().manual_seed(seed)  # that of torch belongs to the whole process
     try:
         for window in job.windows():
-            job.refine(window, effort, seed, random, tick)
+            if job.holds(window):
+                job.refine(window, effort, seed, random, tick)
+            else:
+                tick(window.samples * (effort.steps + effort.rounds))
     except KeyboardInterrupt:
         complete = False
     return job.planes(), complete
@@ -199,6 +202,13 @@ class Job:
             for top in range(0, rows, side)
             for left in range(0, columns, side)
         ]
+
+    def holds(self, box: Window) -> bool:
+        """Whether a window sees any cell of the support."""
+        if self.raster.cells is None:
+            return True
+        rows, columns = (slice(s.start >> CELL, -(-s.stop >> CELL)) for s in box.outer)
+        return bool(self.raster.cells[rows, columns].any())
 
     def refine(
         self, box: Window, effort: Effort, seed: int, random: torch.Generator,

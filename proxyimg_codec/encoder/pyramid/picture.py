@@ -18,8 +18,9 @@ from ...texture.network import Floats
 from ...texture.occlusion import Occlusion
 from ...texture.planes import Planes, cells_of
 from ...texture.pyramid import PyramidTexture
+from ..completion.behind import Source, pixels_behind
 from ..completion.hidden import copies_of
-from ..completion.membrane import continued
+from ..completion.membrane import KNOWN, continued
 from ..settings import Settings
 from ..shapes.coverage import coverage_of
 from ..shapes.layers import Plan
@@ -49,7 +50,9 @@ class Interrupts:
     seen: bool = False
 
 
-def encode_picture(picture: Floats, plan: Plan, settings: Settings, report: Report) -> Picture:
+def encode_picture(
+    picture: Floats, plan: Plan, settings: Settings, report: Report, behind: Source | None = None
+) -> Picture:
     """Encodes planned layers with pyramid textures.
 
     On `KeyboardInterrupt` during refinement, the picture has the latents that were found so far.
@@ -59,11 +62,13 @@ def encode_picture(picture: Floats, plan: Plan, settings: Settings, report: Repo
         plan: Plan of the layers.
         settings: Settings of the encoder.
         report: Called with the name of a stage, and its numbers of units done and in all.
+        behind: What gives the hidden pixels of the back layer; None if they are copied or filled.
 
     Returns:
         A picture with a depth of 8 bits, without metadata.
 
     Raises:
+        InputError: An inpainter fails.
         UsageError: A target size or PSNR is out of reach.
     """
     height, width = picture.shape[:2]
@@ -72,17 +77,26 @@ def encode_picture(picture: Floats, plan: Plan, settings: Settings, report: Repo
         _view(boundaries, k, coverage_of(boundary, width, height).reshape(height, width))
         for k, boundary in enumerate(boundaries)
     ]
-    copies = [copies_of(picture, cuts, settings) for _, cuts in views]
     rasters = [colour_of(picture)._replace(structural=settings.tune == "ms-ssim")]
     if plan.channels == 4:
         rasters.append(alpha_of(picture[..., 3]))
+    shared = len(rasters)
+    own = [] if behind is None else _behind(rasters, views[0][1], behind)
+    rasters += own
+    copies = [
+        None if own and k == 0 else copies_of(picture, cuts, settings)
+        for k, (_, cuts) in enumerate(views)
+    ]
 
     def picture_of(sources: Sequence[Planes]) -> Picture:
+        alpha = sources[1] if shared > 1 else None
+        hidden, alpha_of_hidden = (*sources[shared:], None, None)[:2]
         layers = [
             Layer(v.name, box, v.boundary,
-                  PyramidTexture(sources[0], sources[1] if len(sources) > 1 else None, box,
-                                 cuts=cuts, copies=copied), v.mesh, parent=v.parent)
-            for v, (box, cuts), copied in zip(plan.layers, views, copies, strict=True)
+                  PyramidTexture(sources[0], alpha, box, cuts=cuts, behind=None if k else hidden,
+                                 behind_alpha=None if k else alpha_of_hidden, copies=copies[k]),
+                  v.mesh, parent=v.parent)
+            for k, (v, (box, cuts)) in enumerate(zip(plan.layers, views, strict=True))
         ]  # fmt: skip
         return Picture(width, height, plan.channels, plan.opaque, 8, Layers(layers), (),
                        groups=plan.groups)  # fmt: skip
@@ -245,6 +259,32 @@ def colour_of(picture: Floats) -> Raster:
 def alpha_of(alpha: Floats) -> Raster:
     """Makes a grey raster of alpha, float32 [H, W] in 0..1."""
     return Raster(np.repeat(alpha[..., None] * np.float32(255), 3, 2), None, None, True)
+
+
+def _behind(rasters: Sequence[Raster], cuts: Occlusion | None, source: Source) -> list[Raster]:
+    """Makes rasters of the hidden pixels of the back layer; none if nothing of it is hidden.
+
+    Args:
+        rasters: Rasters of the colour of the picture, and of its alpha if it has planes.
+        cuts: Cuts of the back layer.
+        source: What gives the pixels.
+
+    Returns:
+        The raster of colour, and if there is one of alpha, one that continues it.
+    """
+    found = pixels_behind(rasters[0].samples / np.float32(255), cuts, source)
+    if found is None or cuts is None:
+        return []
+    pixels, hidden = found
+    samples, weight, cells = pixels * np.float32(255), hidden.astype(np.float32), _cells(hidden)
+    grey = rasters[0].grey and bool((samples == samples[..., :1]).all())
+    made = [rasters[0]._replace(samples=samples, weight=weight, cells=cells, grey=grey)]
+    x, y, width, height = cuts.box
+    for alpha in rasters[1:]:
+        part = alpha.samples[y : y + height, x : x + width]
+        whole = continued(part, np.where(cuts.trusted, np.float32(KNOWN), np.float32(0)))
+        made.append(Raster(np.clip(whole, 0, 255), weight, cells, True))
+    return made
 
 
 def _cells(mask: NDArray[np.bool_]) -> NDArray[np.bool_] | None:

@@ -21,8 +21,9 @@ Floats = NDArray[np.float32]
 NO_MEMORY = ("allocate memory", "Available memory", "bad_alloc", "bad allocation")
 """What messages of onnxruntime have in them when memory is short."""
 
-KEPT = 4
-"""Models that stay loaded for the next picture: an encoder, a decoder, a figure and a depth."""
+KEPT = 5
+"""Models that stay loaded for the next picture: an encoder, a decoder, a figure, a depth and an
+inpainter."""
 
 
 @dataclass(frozen=True)

@@ -267,3 +267,27 @@ def test_small_pictures_are_tuned_too(size, channels):
     pixels = np.random.default_rng(2).integers(0, 256, (*size, channels)).astype(np.uint8)
     image = encode(pixels, tune="ms-ssim", effort=1, quality=90)
     assert psnr(pixels, from_bytes(image.to_bytes())) > 20
+
+
+def test_windows_without_support_are_passed_over(monkeypatch):
+    """Progress counts them, and what is stored does not change."""
+    samples = textured(1610, 24).astype(np.float32)
+    cells = np.zeros((3, 202), bool)
+    cells[:, 5:20] = True
+    raster, found = Raster(samples, None, cells), []
+    for holds in (pyramid.Job.holds, lambda self, box: True):
+        refined, ticks = [], []
+        refine_one = pyramid.Job.refine
+
+        def refined_too(self, box, *rest, refine_one=refine_one, refined=refined):
+            refined.append(box)
+            refine_one(self, box, *rest)
+
+        with monkeypatch.context() as patch:
+            patch.setattr(pyramid.Job, "holds", holds)
+            patch.setattr(pyramid.Job, "refine", refined_too)
+            planes, _ = pyramid.encode(raster, 300, Effort(0, 2), 0, ticks.append)
+        found.append((len(refined), sum(ticks), planes.raster[:, 40:160]))
+    assert [count for count, _, _ in found] == [1, 3]
+    assert found[0][1] == found[1][1] == 2 * 1610 * 24
+    assert np.abs(found[0][2] - found[1][2]).max() < 0.02

@@ -1,1 +1,1 @@
-"""Models of other projects, as files of the user: SAM, Depth Anything, saliency."""
+"""Models of other projects, as files of the user: SAM, Depth Anything, saliency, LaMa."""

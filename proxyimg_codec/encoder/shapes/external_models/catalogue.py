@@ -9,8 +9,9 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-SAM, FIGURES, DEPTH = "sam", "saliency", "depth"
-"""Purposes of models: masks of anything, also of what is pointed at; what stands out; nearness."""
+SAM, FIGURES, DEPTH, INPAINTING = "sam", "saliency", "depth", "inpainting"
+"""Purposes of models: masks of anything, also of what is pointed at; what stands out; nearness;
+what lies behind."""
 
 FOLDERS = "PXI_MODELS"
 """Variable of the environment with folders of models, separated as those in PATH."""
@@ -39,7 +40,7 @@ class Entry:
 
     Attributes:
         name: Name in commands.
-        purpose: What it is for: ``sam``, ``saliency`` or ``depth``.
+        purpose: What it is for: ``sam``, ``saliency``, ``depth`` or ``inpainting``.
         about: A few words about it.
         licence: Licence of its weights.
         project: Page of the project.
@@ -58,6 +59,7 @@ _REMBG = "https://github.com/danielgatis/rembg/releases/download/v0.0.0/"
 _MOBILE = "https://huggingface.co/Acly/MobileSAM/resolve/main/"
 _EFFICIENT = "https://raw.githubusercontent.com/yformer/EfficientSAM/main/weights/"
 _SAM2 = "https://huggingface.co/vietanhdev/segment-anything-2-onnx-models/resolve/main/"
+_LAMA = "https://huggingface.co/Carve/LaMa-ONNX/resolve/main/"
 _DEPTH = "https://github.com/fabio-sim/Depth-Anything-ONNX/releases/download/"
 
 # Checksums are those that at least two projects state independently of each other.
@@ -132,6 +134,12 @@ ENTRIES = (
         "depth-anything-v2-base", DEPTH, "Depth Anything V2, ViT-B", "CC-BY-NC-4.0",
         "https://github.com/DepthAnything/Depth-Anything-V2",
         (File("depth_anything_v2_vitb.onnx", f"{_DEPTH}v2.0.0/depth_anything_v2_vitb.onnx"),),
+    ),
+    Entry(
+        "lama", INPAINTING, "LaMa: what lies behind objects, seen at 512x512", "Apache-2.0",
+        "https://github.com/advimman/lama",
+        (File("lama_fp32.onnx", f"{_LAMA}lama_fp32.onnx", 208_044_816,
+              "1faef5301d78db7dda502fe59966957ec4b79dd64e16f03ed96913c7a4eb68d6"),),
     ),
 )  # fmt: skip
 """Known models; of those for the same purpose the first that is here is taken."""

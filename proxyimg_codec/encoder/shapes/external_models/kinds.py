@@ -29,6 +29,7 @@ class Kind(Enum):
     U2NET = "figures, as U²-Net"
     ISNET = "figures, as IS-Net"
     DEPTH = "relative depth, as Depth Anything"
+    INPAINTING = "inpainting, as LaMa"
 
 
 PARTNERS = {
@@ -68,7 +69,7 @@ the inputs image_embeddings, point_coords, point_labels, mask_input, has_mask_in
 and the outputs masks, iou_predictions; EfficientSAM: batched_images, batched_point_coords, \
 batched_point_labels; SAM 2: image_embed, high_res_feats_0, high_res_feats_1; figures: one \
 picture [1, 3, h, w] in, first output [1, 1, h, w]; depth: one picture in, one output [1, h, w] \
-or named depth"""
+or named depth; inpainting: a picture [1, 3, h, w] and a mask [1, 1, h, w] in, a picture out"""
 """Inputs and outputs of all kinds, for errors."""
 
 
@@ -118,7 +119,9 @@ def tensors(model: Model) -> str:
 
 
 def _by_shape(model: Model) -> Kind | None:
-    """Kind of a model with one input, a picture; None if there is none."""
+    """Kind of a model with one input, a picture, or with a hole too; None if there is none."""
+    if picture_and_hole(model) is not None:
+        return Kind.INPAINTING
     if len(model.inputs) != 1 or not model.outputs:
         return None
     picture, first = model.inputs[0], model.outputs[0]
@@ -135,8 +138,18 @@ def _by_shape(model: Model) -> Kind | None:
     return None
 
 
-def _planes(tensor: Tensor) -> bool:
-    """Whether a tensor is a picture of three planes, [1, 3, h, w]."""
+def picture_and_hole(model: Model) -> tuple[Tensor, Tensor] | None:
+    """Inputs of a model of inpainting, the picture and the mask of its hole; None of others."""
+    if len(model.inputs) != 2 or not model.outputs or not _planes(model.outputs[0]):
+        return None
+    for picture, hole in (model.inputs, model.inputs[::-1]):
+        if _planes(picture) and _planes(hole, 1) and "mask" not in picture.name.lower():
+            return picture, hole
+    return None
+
+
+def _planes(tensor: Tensor, count: int = PICTURE_CHANNELS) -> bool:
+    """Whether a tensor is a picture of so many planes, [1, count, h, w]."""
     shape = tensor.shape
     floats = tensor.dtype in ("float32", "float16")
-    return len(shape) == 4 and shape[1] in (PICTURE_CHANNELS, None) and floats
+    return len(shape) == 4 and shape[1] in (count, None) and floats

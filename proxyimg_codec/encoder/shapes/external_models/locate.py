@@ -7,13 +7,25 @@ from pathlib import Path
 
 from ....errors import InputError, UsageError
 from ..onnx_model import Model, load
-from .catalogue import DEPTH, ENTRIES, FIGURES, FOLDERS, SAM, Entry, entry, folders, here
+from .catalogue import (
+    DEPTH,
+    ENTRIES,
+    FIGURES,
+    FOLDERS,
+    INPAINTING,
+    SAM,
+    Entry,
+    entry,
+    folders,
+    here,
+)
 from .kinds import PARTNERS, Kind, kind_of
 
 PATTERNS = {
     SAM: "*sam*encoder*.onnx",
     FIGURES: "*u2net*.onnx",
     DEPTH: "*depth*.onnx",
+    INPAINTING: "*lama*.onnx",
 }
 """Names of files that are taken for a purpose if no known model is here."""
 
@@ -28,7 +40,8 @@ def locate(name: str) -> list[Path]:
 
     Args:
         name: A path; two paths, encoder and decoder, joined by the character that joins folders
-            in PATH; the name of a known model; or a purpose: ``sam``, ``saliency``, ``depth``.
+            in PATH; the name of a known model; or a purpose: ``sam``, ``saliency``, ``depth``,
+            ``inpainting``.
 
     Returns:
         Its files; of a SAM the encoder, then the decoder, unless only one of them was named.

@@ -112,9 +112,10 @@ def _by_model(
         figure = figure_map(load(paths[0], jobs), rgb)
         boundary = find_maps(rgb, jobs).boundary
         regions = regions_of_figure(rgb, figure, max_layers, support, boundary)
-    elif kind is Kind.DEPTH:
-        raise InputError(f"{paths[0]}: this is a model of depth, which finds no layers; give it "
-                         "to --depth")  # fmt: skip
+    elif kind in (Kind.DEPTH, Kind.INPAINTING):
+        flag = "depth" if kind is Kind.DEPTH else "background"
+        raise InputError(f"{paths[0]}: this is a model of {kind.value}, which finds no layers; "
+                         f"give it to --{flag}")  # fmt: skip
     else:
         found = everything(*load_pair(paths, jobs), rgb)
         regions = regions_of_masks(rgb, found, max_layers, support)

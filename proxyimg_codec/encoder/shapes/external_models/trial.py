@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..onnx_model import load
-from .catalogue import DEPTH, FIGURES, SAM
+from .catalogue import DEPTH, FIGURES, INPAINTING, SAM
 from .depth import depth_map
 from .figure import figure_map
+from .inpainting import inpainted
 from .kinds import Kind, kind_of, tensors
 from .locate import load_pair
 from .sam import INSIDE, see
@@ -28,7 +29,7 @@ class Trial:
 
     Attributes:
         kind: What the model is, in words.
-        purpose: What it is for: ``sam``, ``saliency`` or ``depth``.
+        purpose: What it is for: ``sam``, ``saliency``, ``depth`` or ``inpainting``.
         tensors: Inputs and outputs of its files, in words.
         result: What it found, in words.
         seconds: Time that it took.
@@ -72,6 +73,12 @@ def tried(paths: list[Path], jobs: int = 1) -> Trial:
         purpose, parts = DEPTH, [model]
         found = depth_map(model, rgb)
         result = f"nearness from {found.min():.3g} to {found.max():.3g}"
+    elif kind is Kind.INPAINTING:
+        purpose, parts = INPAINTING, [model]
+        hole = cv2.dilate(rgb[..., 0] - rgb[..., 1], np.ones((5, 5), np.uint8)) > 0
+        filled = inpainted(model, rgb.astype(np.float32) / np.float32(255), hole)[hole]
+        red, green, blue = (round(255 * float(v)) for v in filled.mean(0))
+        result = f"a hole filled with {red}, {green}, {blue} on average"
     else:
         encoder, decoder = load_pair(paths, jobs)
         purpose, parts = SAM, [m for m in (encoder, decoder) if m is not None]

@@ -20,6 +20,8 @@ KINDS = [
     (lambda: onnx_models.figures(1024), Kind.ISNET),
     (onnx_models.depth, Kind.DEPTH),
     (lambda: onnx_models.depth("518", "518", four=True), Kind.DEPTH),
+    (onnx_models.inpainting, Kind.INPAINTING),
+    (lambda: onnx_models.inpainting("512, 512", 255), Kind.INPAINTING),
 ]
 
 
@@ -32,6 +34,8 @@ OTHERS = [
     "agraph (float[1, 10] x) => (float[1, 10] y) { y = Identity(x) }",
     "agraph (float[1, 4, 8, 8] x) => (float[1, 4, 8, 8] y) { y = Identity(x) }",
     "agraph (int64[1, 3, 8, 8] x) => (int64[1, 3, 8, 8] y) { y = Identity(x) }",
+    "agraph (float[1, 3, 8, 8] x, float[1, 3, 8, 8] m) => (float[1, 3, 8, 8] y) { y = Add(x, m) }",
+    "agraph (float[1, 3, 8, 8] x, float[1, 1, 8, 8] m) => (float[1, 1, 8, 8] y) { y = Abs(m) }",
     """agraph (float[1, 256, 64, 64] image_embeddings, float[1, n, 2] point_coords,
         float[1, n] point_labels, float[1] mood) => (float[1] masks, float[1] iou_predictions) {
         masks = Identity(mood) iou_predictions = Identity(mood) }""",
@@ -52,7 +56,9 @@ def test_others_are_explained(tmp_path, text):
 def test_a_model_for_something_else_is_told(tmp_path):
     depth = onnx_models.write(tmp_path / "d.onnx", onnx_models.depth())
     figure = onnx_models.write(tmp_path / "f.onnx", onnx_models.figures())
-    with pytest.raises(InputError, match="finds no layers; give it to --depth"):
-        segmenters.find_segmenter(str(depth))(smooth(48, 40), 4, None)
+    lama = onnx_models.write(tmp_path / "l.onnx", onnx_models.inpainting())
+    for path, flag in ((depth, "depth"), (lama, "background")):
+        with pytest.raises(InputError, match=f"finds no layers; give it to --{flag}"):
+            segmenters.find_segmenter(str(path))(smooth(48, 40), 4, None)
     with pytest.raises(InputError, match=r"kind figures, as U²-Net .* needs relative depth"):
         segmenters.find_depth(str(figure))(smooth(48, 40))
