@@ -114,7 +114,7 @@ def lifts_of(copier: Copier) -> Values:
 
 
 def _rim(copier: Copier, cells: Numbers) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """What cells miss of known samples around them, [C, n], and the weights of that [n]."""
+    """Differences of known samples from copies of the cells around them, [C, n]; weights [n]."""
     side, size = copier.side, 2 * copier.side - copier.side % 2
     start = -(side // 2), -(side // 2)
     aims, weights = [], []
@@ -133,7 +133,7 @@ def _rim(copier: Copier, cells: Numbers) -> tuple[NDArray[np.int64], NDArray[np.
 def _between(
     copier: Copier, cells: Numbers, other: Numbers, down: int
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """How much copies of cells exceed those of their neighbours to the right, or below.
+    """Excess of copies of cells over those of their neighbours to the right, or below.
 
     Returns:
         int64 [C, n], and bool [n], False where there is no neighbour, or nothing to compare.
