@@ -90,7 +90,7 @@ class Composite(NamedTuple):
 def composites(data: Path, count: int) -> Iterator[Composite]:
     """Yields composites, always the same; in every second one two sprites overlap."""
     photographs = [*sorted((data / "kodak").glob("*.png")), *sorted((data / "photo2k").glob("*.*"))]
-    cut_out = [s for f in _sprite_files(data) if (s := solid(_rgba(f))) is not None]
+    cut_out = [s for f in sprite_files(data) if (s := solid(rgba(f))) is not None]
     for k in range(count):
         rng = np.random.default_rng(k)
         photograph = reduced(read_rgb(photographs[k % len(photographs)]), SIDE)
@@ -241,13 +241,14 @@ def scaled(rgba: Pixels, side: float) -> Pixels:
     return np.asarray(picture.convert("RGBA"))
 
 
-def _sprite_files(data: Path) -> list[Path]:
+def sprite_files(data: Path) -> list[Path]:
     """Files of sprites that training leaves out: all cliparts, and a tenth of the emoji."""
     emoji = [f for f in sorted((data / "emoji").glob("*.*"))
              if int(hashlib.sha1(f.read_bytes()).hexdigest(), 16) % 10 == 0]  # fmt: skip
     return [*sorted((data / "clipart").glob("*.png")), *emoji]
 
 
-def _rgba(file: Path) -> Pixels:
+def rgba(file: Path) -> Pixels:
+    """Reads a picture file as uint8 [H, W, 4]."""
     with Image.open(file) as picture:
         return np.asarray(picture.convert("RGBA"))

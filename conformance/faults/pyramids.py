@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from proxyimg_codec.codec import unpack as unpacking
 from proxyimg_codec.entropy import laplace
 from proxyimg_codec.geometry.pose import Pose
 from proxyimg_codec.native import kernel
-from proxyimg_codec.render import compose
+from proxyimg_codec.render import compose, neighbours
 from proxyimg_codec.texture import (
     completion,
     context,
@@ -23,6 +24,7 @@ from proxyimg_codec.texture import (
     pyramid,
     registered_model,
     synthesis,
+    unmix,
 )
 from proxyimg_codec.texture.context import LevelCoder
 from proxyimg_codec.texture.grid import Grid
@@ -172,7 +174,15 @@ def _back_bares(*args: Any) -> Moved:
 
 
 def _only_where(self: Pose, other: Pose) -> bool:
-    return (self.matrix, self.shift) == (other.matrix, other.shift)
+    return (self.matrix, self.shift, self.colour) == (other.matrix, other.shift, other.colour)
+
+
+def _any_colour(self: Pose, other: Pose) -> bool:
+    return still_of(self, replace(other, colour=self.colour))
+
+
+def _all_drawn(picture: Any, layer: Any, drawn: Any) -> Moved:
+    return neighbours_of(picture, layer, frozenset(picture.layers))
 
 
 def _without(*fields: str) -> Any:
@@ -216,6 +226,7 @@ grid_of, wave_of, escape_of = Grid.of, LevelCoder._wave, latents.Decoder._escape
 position_of, samples_of = pyramid._position, PyramidTexture._samples
 unpack_of, premultiplied_of = pyramid.unpack, compose.premultiplied
 moved_of, known_of = Occlusion.moved, PyramidTexture._known
+still_of, neighbours_of = Pose.still, neighbours.moved_neighbours
 copies_of, weights_of, bases_of = completion.unpack, completion._weights, completion._bases
 
 _FAULTS: dict[str, list[Patch]] = {
@@ -260,7 +271,16 @@ _FAULTS: dict[str, list[Patch]] = {
     "trusts-mixed-samples": [(Occlusion, "trusted", property(lambda self: self.shown))],
     "keeps-rims": [(Occlusion, "moved", lambda *a: ALL_IN_PLACE)],
     "keeps-rims-of-its-own": [(Occlusion, "moved", lambda *a: moved_of(*a)._replace(behind=()))],
-    "keeps-rims-of-what-is-not-drawn": [(Pose, "still", _only_where)],
+    "keeps-mixed-colours": [(unmix, "_own", lambda raster, edge:
+        raster.reshape(-1, raster.shape[2])[edge.core])],
+    "fills-own-rims": [(pyramid, "rim", lambda *a: None)],
+    "unmixes-always": [(unpacking, "replace", lambda cuts, **flags: cuts)],
+    "unmixes-by-coverage-alone": [(occlusion, "_smooth", lambda covered: 36 * covered)],
+    "unmixes-with-what-is-far": [(unmix, "BEYOND", 4)],
+    "keeps-rims-of-what-is-not-drawn": [(compose, "moved_neighbours", _all_drawn)],
+    "keeps-rims-of-what-is-bent-or-shines-through": [(Pose, "still", _only_where)],
+    "keeps-rims-of-what-is-recoloured": [(Pose, "still", _any_colour)],
+    "keeps-rims-of-another-raster": [(neighbours, "_place", lambda *a: None)],
     "loses-rims-everywhere": [(Occlusion, "moved", _all_bare)],
     "loses-rims-of-what-moves-together": [(Occlusion, "moved", _back_bares)],
     "ignores-behind": [(pyramid, "unpack", _without("behind", "behind_alpha"))],

@@ -98,7 +98,7 @@ _TOPICS = {
     "pyramid: mask": "PYR-39",
     "pyramid: cuts": "PYR-40 PYR-41",
     "pyramid: fill": "PYR-42",
-    "pyramid: moved": "PYR-46",
+    "pyramid: moved": "PYR-46 PYR-52",
     "pyramid: behind": "PYR-47",
     "pyramid: copies": "PYR-48 PYR-49",
     "pyramid: rim": "PYR-50 PYR-51",

@@ -101,6 +101,7 @@ def _textures(
             textures.append(textures[v["texture"]])
         elif v["coder"] == texr.PYRAMID:
             cuts = Occlusion.of(v["cuts"], i, outlines, _box(layer))
+            cuts = cuts and replace(cuts, unmix=bool(v["unmix"]))
             textures.append(pyramid.unpack(v, sources, where, cuts))
         else:
             textures.append(implicit.unpack(v, networks, where, layer["sampling"]))

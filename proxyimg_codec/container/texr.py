@@ -26,7 +26,7 @@ COMPLETED_FROM = (0, 11)
 """First version whose pyramid textures have the fields of `ABSENT`."""
 
 ABSENT: dict[str, Any] = {
-    "behind": 0, "behind_alpha": 0, "grain": 0, "offsets": [], "sources": b"",
+    "behind": 0, "behind_alpha": 0, "grain": 0, "offsets": [], "sources": b"", "unmix": 0,
 }  # fmt: skip
 """Values for what pyramid textures of earlier versions do not have."""
 
@@ -73,6 +73,8 @@ PYRAMID_FIELDS = (
           "copied.", -(1 << 24), 1 << 24),
     Field("sources", "bin", "Coded array of rows and columns of cells: the offset of each, counted "
           "from 1; 0 = none; empty = none at all."),
+    Field("unmix", "int", "1 = samples at the boundary of the layer itself are unmixed where what "
+          "is behind has changed; 0 = they are filled.", 0, 1),
 )  # fmt: skip
 
 CODERS = {SHARED: SHARED_FIELDS, IMPLICIT: FIELDS, PYRAMID: PYRAMID_FIELDS}

@@ -111,7 +111,7 @@ def _composited(
     Returns:
         float32 [BLOCK, 4] premultiplied colour and alpha.
     """
-    graph = at.graph
+    graph, drawn = at.graph, frozenset(chosen)
     result = graph.constant(np.zeros((BLOCK, 4), np.float32))
     clear = graph.constant(np.ones((BLOCK, 1), np.float32))
     for layer in reversed(chosen):
@@ -119,7 +119,7 @@ def _composited(
         if layer in outlines:
             covered = coverage(outlines[layer], corner).reshape(-1, 1)
             weight = clear * covered
-        seen = _seen(picture, layer, at, weight) * weight
+        seen = _seen(picture, layer, drawn, at, weight) * weight
         result = result + seen
         clear = clear - seen.take(np.array([3]), 1)
     return result
@@ -138,14 +138,16 @@ def _blocks(points: Value) -> tuple[Value, Value]:
     return numbers.minimum(count - 1).reshape(-1, BLOCK), count
 
 
-def _seen(picture: Picture, layer: Layer, at: Value, weight: Value) -> Value:
+def _seen(
+    picture: Picture, layer: Layer, drawn: frozenset[Layer], at: Value, weight: Value
+) -> Value:
     """Colour float32 [BLOCK, 4] of a layer at points; 0 where its weight is 0."""
     graph = at.graph
     nothing = graph.constant(np.zeros((BLOCK, 4), np.float32))
 
     def some() -> Value:
         index = graph.op("NonZero", weight.reshape(-1), dtype=np.int64).reshape(-1)
-        found = colour(picture, layer, locate(layer, at.take(index)))
+        found = colour(picture, layer, drawn, locate(layer, at.take(index)))
         return graph.op("ScatterND", nothing, index.reshape(-1, 1), found)
 
     return graph.choose(weight.reduced("Max") > 0, some, lambda: nothing)

@@ -23,17 +23,18 @@ SAMPLE_ONE = 65535
 """Integer that stands for the sample 1.0 of a raster in the model."""
 
 
-def colour(picture: Picture, layer: Layer, shown: Shown) -> Value:
+def colour(picture: Picture, layer: Layer, drawn: frozenset[Layer], shown: Shown) -> Value:
     """Premultiplied colour and alpha float32 [N, 4] of a layer in its pose.
 
     Args:
         picture: The picture.
         layer: The layer.
+        drawn: All layers that are drawn.
         shown: The texture points of the samples.
     """
     texture, graph = layer.texture, shown.points.graph
     if isinstance(texture, PyramidTexture):
-        padded = texture.padded(moved_neighbours(picture, layer))
+        padded = texture.padded(moved_neighbours(picture, layer, drawn))
         found, channels = _sampled(layer, texture, padded, shown.points), texture.channels(())
     else:
         network = picture.network_of(layer)

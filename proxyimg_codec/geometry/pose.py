@@ -121,12 +121,12 @@ class Pose:
     def still(self, other: Pose) -> bool:
         """Whether a layer in this pose and one in the pose `other` rest on each other [PYR-46].
 
-        They do if both have moved alike, neither has displacements by edits, and both are drawn in
-        full.
+        They do if both have moved and changed colour alike, neither has displacements by edits,
+        and both are opaque. Whether they are drawn is left to the caller.
         """
-        alike = (self.matrix, self.shift, self.body) == (other.matrix, other.shift, other.body)
-        return alike and not any(
-            p.nodes is not None or p.places is not None or p.hidden or p.opacity != OPACITY_MAX
+        ours, theirs = ((p.matrix, p.shift, p.body, p.colour) for p in (self, other))
+        return ours == theirs and not any(
+            p.nodes is not None or p.places is not None or p.opacity != OPACITY_MAX
             for p in (self, other)
         )
 

@@ -44,6 +44,8 @@ def compose(
 ) -> None:
     """Draws layers, and hands finished tiles to a function.
 
+    What a layer was mixed with, of neighbours that are not drawn, does not show [PYR-46].
+
     Args:
         picture: Picture that the layers belong to.
         view: Output size and region.
@@ -64,7 +66,10 @@ def compose(
     budget, cache = Budget(limits), cache or Cache()
     samples = view.width * sx * view.height * sy
     budget.spend("multiply_adds", len(layers) * samples << SAMPLE_COST_BITS)
-    painters = [_Painter(picture, layer, view, engine, budget, cache) for layer in reversed(layers)]
+    drawn = frozenset(layers)
+    painters = [
+        _Painter(picture, layer, drawn, view, engine, budget, cache) for layer in reversed(layers)
+    ]
     tile_w = max(min(view.width, TILE_SAMPLES // (sx * sy)), 1)
     tile_h = max(TILE_SAMPLES // (tile_w * sx * sy), 1)
     for row in range(0, view.height, tile_h):
@@ -103,15 +108,16 @@ class _Painter:
     """Renderer of one layer on the sample grid of one view."""
 
     def __init__(
-        self, picture: Picture, layer: Layer, view: View, engine: str, budget: Budget, cache: Cache
-    ) -> None:
+        self, picture: Picture, layer: Layer, drawn: frozenset[Layer], view: View, engine: str,
+        budget: Budget, cache: Cache,
+    ) -> None:  # fmt: skip
         self._picture, self._layer, self._view = picture, layer, view
         self._budget, self._cache = budget, cache
         self._engine = engine
         self._run = engines.find(engine)
         self.native = self._run is engines.run_native
         self._network = picture.network_of(layer)
-        self._moved = moved_neighbours(picture, layer)
+        self._moved = moved_neighbours(picture, layer, drawn)
         self._paths = outline(present_outline(picture, layer), view)
         self._warp = Warp(layer.pose, layer.mesh, layer.sampling in (1, 2), budget)
         sx, sy = view.supersampling

@@ -1,9 +1,9 @@
-"""Neighbours of a layer that have moved since its texture was cut [PYR-46].
+"""Neighbours of a layer that are no longer as they were when its texture was cut [PYR-46].
 
 The layers of a pyramid picture are views of one raster. A view knows the boundaries that cut it
 when it was made (`texture.occlusion`). The raster samples on such a boundary are mixtures of the
-colours on both sides. They no longer fit once an edit has moved the boundary away or removed its
-layer.
+colours on both sides. They no longer fit once an edit has moved the boundary away, removed its
+layer or changed its colours, nor where that layer is not drawn.
 """
 
 from __future__ import annotations
@@ -13,17 +13,20 @@ from dataclasses import replace
 from weakref import WeakKeyDictionary
 
 from ..geometry.boundary import Boundary
-from ..geometry.pose import Pose
 from ..geometry.warp import outline
 from ..model import Layer, Picture
+from ..texture.implicit import Box
 from ..texture.occlusion import ALL_IN_PLACE, Moved
+from ..texture.planes import Planes
 from ..texture.pyramid import PyramidTexture, Texture
 
 Size = tuple[int, int]
 
 
 _OUTLINES: WeakKeyDictionary[Layer, tuple[Size, Boundary | None]] = WeakKeyDictionary()
-_MOVED: WeakKeyDictionary[Picture, dict[Layer, Moved]] = WeakKeyDictionary()
+_MOVED: WeakKeyDictionary[Picture, dict[tuple[Layer, frozenset[Layer]], Moved]] = (
+    WeakKeyDictionary()
+)
 
 
 def present_outline(picture: Picture, layer: Layer) -> Boundary | None:
@@ -35,33 +38,58 @@ def present_outline(picture: Picture, layer: Layer) -> Boundary | None:
     return known[1]
 
 
-def moved_neighbours(picture: Picture, layer: Layer) -> Moved:
-    """Finds what has moved relative to a layer since its view was cut; see `Moved`."""
-    known = _MOVED.setdefault(picture, {})
-    if layer not in known:
-        layers = picture.layers
-        home = next(k for k, v in enumerate(layers) if v.texture is layer.texture)
-        known[layer] = _moved(layer.texture, layer.pose, layers, home)
-    return known[layer]
-
-
-def _moved(view: Texture, pose: Pose, layers: Sequence[Layer], home: int) -> Moved:
-    """Finds what has moved relative to a layer that shows a view.
+def moved_neighbours(
+    picture: Picture, layer: Layer, drawn: frozenset[Layer] | None = None
+) -> Moved:
+    """Finds what has changed beside a layer since its view was cut; see `Moved`.
 
     Args:
-        view: Texture of the layer.
-        pose: Pose of the layer.
+        picture: The picture.
+        layer: A layer of it.
+        drawn: Layers that are drawn; by default those that are not hidden.
+    """
+    layers = picture.layers
+    if drawn is None:
+        drawn = _visible(layers)
+    known = _MOVED.setdefault(picture, {})
+    if (layer, drawn) not in known:
+        home = next(k for k, v in enumerate(layers) if v.texture is layer.texture)
+        known[layer, drawn] = _moved(layer, layers, home, drawn)
+    return known[layer, drawn]
+
+
+def _visible(layers: Sequence[Layer]) -> frozenset[Layer]:
+    return frozenset(layer for layer in layers if not layer.pose.hidden)
+
+
+def _moved(layer: Layer, layers: Sequence[Layer], home: int, drawn: frozenset[Layer]) -> Moved:
+    """Finds what has changed beside a layer that shows a view.
+
+    Args:
+        layer: The layer.
         layers: All layers, back to front.
         home: Number of the layer for which the view was cut, the first one that shows it.
+        drawn: Layers that are drawn.
     """
+    view = layer.texture
     if not isinstance(view, PyramidTexture) or view.cuts is None:
         return ALL_IN_PLACE
-    boundaries = [v.boundary for v in layers]
-    still = [v.pose.still(pose) for v in layers]
-    raster = [
-        isinstance(v.texture, PyramidTexture) and v.texture.planes is view.planes for v in layers
+    raster = _place(view, view.cuts.box)
+    still = [
+        {v, layer} <= drawn and v.pose.still(layer.pose) and _place(v.texture, v.box) == raster
+        for v in layers
     ]
-    return view.cuts.moved(home, boundaries, still, raster)
+    return view.cuts.moved(home, [v.boundary for v in layers], still)
+
+
+def _place(texture: Texture, box: Box) -> tuple[Planes, int, int] | None:
+    """Planes that a texture shows over a box, and where on the canvas they begin.
+
+    It is None if there are no planes, or they are stretched.
+    """
+    if not isinstance(texture, PyramidTexture) or texture.part[2:] != box[2:]:
+        return None
+    return texture.planes, box[0] - texture.part[0], box[1] - texture.part[1]
 
 
 def settled(layers: Sequence[Layer]) -> list[Layer]:
@@ -83,7 +111,7 @@ def settled(layers: Sequence[Layer]) -> list[Layer]:
             if home is None:
                 shown[view] = view.masked(view.cuts.everything)
             elif home > i:
-                shown[view] = view.masked(_moved(view, layers[home].pose, layers, home))
+                shown[view] = view.masked(_moved(layers[home], layers, home, _visible(layers)))
             elif view.cuts.numbers(i, boundaries) is None:
                 shown[view] = view.masked(*view.cuts.removed(i, boundaries))
     return [

@@ -1,4 +1,4 @@
-"""Visible and trusted samples of a view that is cut by boundaries [PYR-40, PYR-41, PYR-46].
+"""Visible and trusted samples of a view that is cut by boundaries [PYR-40, PYR-41, PYR-46, PYR-52].
 
 A view is the part of a raster that a layer shows. The raster is the flat picture, so only a part of
 it belongs to the layer: the view is *cut* by the layer's own boundary and by those of layers in
@@ -10,7 +10,7 @@ these.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import NamedTuple
 
@@ -31,16 +31,34 @@ Samples = NDArray[np.bool_]
 
 
 class Moved(NamedTuple):
-    """Neighbours of a view that have moved relative to it since it was cut.
+    """Neighbours of a view that have moved relative to it since it was cut, or look different.
 
     Attributes:
         fronts: Boundaries among `Occlusion.fronts` that have moved or are gone.
-        behind: Layers behind that show the same raster, front to back: the boundary at rest, None
-            for the whole canvas, and whether it still rests in its place. Empty if all do.
+        behind: Layers behind, front to back: the boundary at rest, None for the whole canvas, and
+            whether it still rests in its place. Empty if all do.
     """
 
     fronts: frozenset[Boundary] = frozenset()
     behind: tuple[tuple[Boundary | None, bool], ...] = ()
+
+
+class Edge(NamedTuple):
+    """Samples of a view at its own boundary behind which something has changed [PYR-52].
+
+    Attributes:
+        shown: bool [height, width], True for all samples of the view that show.
+        core: intp [N] ascending numbers of the samples at the boundary that are unmixed.
+        share: float64 [N] share, 0.5..1, that they have of the colour of the layer.
+        outer: intp [M] ascending numbers of those beyond, which continue the colours of `core`.
+        free: bool [height, width], True for samples whose colour is that of what is behind.
+    """
+
+    shown: Samples
+    core: NDArray[np.intp]
+    share: NDArray[np.float64]
+    outer: NDArray[np.intp]
+    free: Samples
 
 
 ALL_IN_PLACE = Moved()
@@ -62,12 +80,14 @@ class Occlusion:
         fronts: Boundaries of layers in front, which cut off everything inside.
         box: Rectangle of the view: x, y, width, height in canvas pixels.
         within: bool [height, width], True for the samples in the mask of the view; None = all.
+        unmix: Whether samples at the layer's own boundary are unmixed, not filled [PYR-52].
     """
 
     own: Boundary | None
     fronts: tuple[Boundary, ...]
     box: Box
     within: Samples | None = None
+    unmix: bool = True
 
     @staticmethod
     def of(
@@ -128,9 +148,8 @@ class Occlusion:
         gone = Moved(
             frozenset(f for f in self.fronts if f not in found), () if owns else ALL_REMOVED
         )
-        left = Occlusion(
-            self.own if owns else None, tuple(f for f in self.fronts if f in found), self.box
-        )
+        fronts = tuple(f for f in self.fronts if f in found)
+        left = replace(self, own=self.own if owns else None, fronts=fronts, within=None)
         return gone, left if left.own or left.fronts else None
 
     def moved(
@@ -138,22 +157,20 @@ class Occlusion:
         layer: int,
         boundaries: Sequence[Boundary | None],
         still: Sequence[bool],
-        raster: Sequence[bool],
     ) -> Moved:
         """Finds the neighbours that have moved relative to the layer that shows the view.
 
         Args:
             layer: Number of the layer for which the view was cut.
             boundaries: Boundaries of all layers at rest, back to front.
-            still: For each layer, whether it rests on the layer that shows the view (`Pose.still`).
-            raster: For each layer, whether it shows a part of the same raster.
+            still: For each layer, whether it rests on the layer that shows the view.
         """
         found = self._matched(layer, boundaries)
         fronts = (f for f in self.fronts if f not in found or not still[found[f]])
         behind: tuple[tuple[Boundary | None, bool], ...] = ALL_REMOVED
         if self._owns(boundaries[layer]):
             below = [] if self.own is None else range(layer - 1, -1, -1)
-            behind = tuple((boundaries[k], still[k]) for k in below if raster[k])
+            behind = tuple((boundaries[k], still[k]) for k in below)
             if all(rests for _, rests in behind):
                 behind = ()
         return Moved(frozenset(fronts), behind)
@@ -212,18 +229,44 @@ class Occlusion:
         return Moved(frozenset(self.fronts), ALL_REMOVED)
 
     def kept(self, moved: Moved) -> Samples:
-        """Samples that show when neighbours have moved, bool [height, width] [PYR-46].
+        """Samples without a trace of neighbours that have moved, bool [height, width].
 
         Near a boundary that has moved, samples are mixtures with a colour that is no longer beside
-        them. So only trusted ones show there. If there are none at all, it is `shown`.
+        them. So only trusted ones are left there. If there are none at all, it is `shown`.
         """
         return _kept(self, moved)
+
+    def edge(self, moved: Moved) -> Edge | None:
+        """Samples at the layer's own boundary that are to be unmixed; None if there are none."""
+        if self.own is None or not self.unmix or not moved.behind:
+            return None
+        return _edge(self, moved)
+
+    def seen(self, moved: Moved) -> Samples:
+        """Samples that show when neighbours have moved, bool [height, width] [PYR-46, PYR-52].
+
+        They are those of `kept`, and those that are unmixed at the layer's own boundary.
+        """
+        if self.own is None or not self.unmix or not moved.behind:
+            return self.kept(moved)
+        edge = self.edge(moved)
+        return self.shown if edge is None else edge.shown
 
     def _left(self, moved: Moved) -> Samples:
         """Samples that are not cut off fully, and not near a cut by a neighbour that has moved.
 
         There may be none.
         """
+        left = self._open(moved)
+        if self.own is not None:
+            some, whole = self._covered(self.own)
+            left &= some
+            if moved.behind:
+                left &= _eroded(whole | ~self._bared(moved))
+        return left
+
+    def _open(self, moved: Moved) -> Samples:
+        """Samples of the mask that layers in front leave, as `_left`."""
         _, _, width, height = self.box
         left, clear = np.ones((2, height, width), np.bool_)
         if self.within is not None:
@@ -233,11 +276,6 @@ class Occlusion:
             left &= ~whole
             if boundary in moved.fronts:
                 clear &= ~some
-        if self.own is not None:
-            some, whole = self._covered(self.own)
-            left &= some
-            if moved.behind:
-                clear &= whole | ~self._bared(moved)
         return left & _eroded(clear)
 
     def _bared(self, moved: Moved) -> Samples:
@@ -289,12 +327,43 @@ def _kept(cuts: Occlusion, moved: Moved) -> Samples:
     return kept if kept.any() else cuts.shown
 
 
-def _eroded(samples: Samples) -> Samples:
-    """Mask eroded by `REACH` across and down; samples outside the array count as True."""
+@lru_cache(maxsize=16)
+def _edge(cuts: Occlusion, moved: Moved) -> Edge | None:
+    """Computes `Occlusion.edge`."""
+    assert cuts.own is not None, "the layer has a boundary"
+    covered = np.zeros(cuts.box[:1:-1], np.int32)
+    for at, values in cuts._coverage(cuts.own):
+        covered[at] = values
+    left = cuts._open(moved)
+    near = left & ~_eroded((covered == FULL) | ~cuts._bared(moved), 1)
+    outer = near & (2 * covered < FULL)
+    shown = left & (covered > 0) & ~outer
+    if not shown.any():
+        return None
+    free = _eroded(covered == 0, 1)
+    if cuts.within is not None:
+        free &= cuts.within
+    for boundary in cuts.fronts:
+        free &= ~cuts._covered(boundary)[0]
+    core = np.flatnonzero(near & ~outer)
+    share = np.maximum(_smooth(covered).ravel()[core] / (36 * FULL), 0.5)
+    return Edge(shown, core, share, np.flatnonzero(outer), free)
+
+
+def _smooth(covered: NDArray[np.int32]) -> NDArray[np.int64]:
+    """Coverage [h, w] weighed 1, 4, 1 across and down; beyond the array it is that at the edge."""
+    padded = np.pad(covered.astype(np.int64), 1, mode="edge")
+    rows = padded[:-2] + 4 * padded[1:-1] + padded[2:]
+    return np.asarray(rows[:, :-2] + 4 * rows[:, 1:-1] + rows[:, 2:])
+
+
+def _eroded(samples: Samples, reach: int | None = None) -> Samples:
+    """Mask eroded across and down, by default by `REACH`; True beyond the array."""
+    reach = REACH if reach is None else reach
     for axis, size in enumerate(samples.shape):
-        beside = [(REACH, REACH) if k == axis else (0, 0) for k in (0, 1)]
+        beside = [(reach, reach) if k == axis else (0, 0) for k in (0, 1)]
         padded = np.pad(samples, beside, constant_values=True)
-        shifted = (np.arange(size) + k for k in range(2 * REACH + 1))
+        shifted = (np.arange(size) + k for k in range(2 * reach + 1))
         samples = np.logical_and.reduce([padded.take(at, axis) for at in shifted])
     return samples
 

@@ -27,6 +27,7 @@ from .implicit import Box, ImplicitTexture
 from .network import Floats, Network
 from .occlusion import ALL_IN_PLACE, Moved, Occlusion, Samples
 from .planes import Planes
+from .unmix import rim
 
 TAPS = 4
 """Number of samples, across and down, that a point is interpolated from."""
@@ -121,10 +122,9 @@ class PyramidTexture:
         if not mask.any():
             mask = np.logical_or.reduce(corners)
         if mask.all():
-            whole_view = replace(self, cell=0, mask=None, cuts=cuts)
-            if cuts is not None:
-                return whole_view
-            return replace(whole_view, behind=None, behind_alpha=None, copies=None)
+            gone = ("behind", "behind_alpha", "copies") if cuts is None else ()
+            lost: dict[str, Any] = dict.fromkeys(gone)
+            return replace(self, cell=0, mask=None, cuts=cuts, **lost)
         if cuts is not None:
             cuts = replace(cuts, within=_samples(mask, 1, self.part))
         return replace(self, cell=1, mask=mask, cuts=cuts)
@@ -149,6 +149,7 @@ class PyramidTexture:
             "behind": 0 if self.behind is None else 1 + numbers[self.behind],
             "behind_alpha": 0 if self.behind_alpha is None else 1 + numbers[self.behind_alpha],
             **({} if self.copies is None else self.copies.fields),
+            "unmix": int(bool(cuts and self.cuts and self.cuts.own and self.cuts.unmix)),
         }
 
     @cached_property
@@ -164,7 +165,7 @@ class PyramidTexture:
 
     def kept(self, moved: Moved) -> Samples | None:
         """Samples of the part that show when neighbours moved, bool [height, width]; None = all."""
-        return self.shown if self.cuts is None or moved == ALL_IN_PLACE else self.cuts.kept(moved)
+        return self.shown if self.cuts is None or moved == ALL_IN_PLACE else self.cuts.seen(moved)
 
     @kernel.Computed
     def filled(self) -> NDArray[np.uint16]:
@@ -244,7 +245,7 @@ class PyramidTexture:
         column, fx = _position(x, box[0], box[2], self.part[2])
         row, fy = _position(y, box[1], box[3], self.part[3])
         if not (fx.any() or fy.any()):
-            return self._samples(row, column, self.kept(moved))
+            return self._samples(row, column, moved)
         padded = self.padded(moved)
         first = row * padded.shape[1] + column
         if native:
@@ -274,10 +275,9 @@ class PyramidTexture:
             rows, columns = (
                 np.clip(np.arange(-1, n + 2), 0, n - 1).astype(np.intp) for n in (height, width)
             )
-            kept = self.kept(moved)
             found = np.empty((len(rows), len(columns), self.channels(())), np.float32)
             for row, out in zip(rows, found, strict=True):
-                out[:] = self._samples(np.full_like(columns, row), columns, kept)
+                out[:] = self._samples(np.full_like(columns, row), columns, moved)
             # `moved` stays the same while a layer is dragged, so keeping the last one is enough.
             self._last.clear()
             self._last[moved] = found
@@ -287,11 +287,10 @@ class PyramidTexture:
     def _last(self) -> dict[Moved, Floats]:
         return {}
 
-    def _samples(
-        self, row: NDArray[np.intp], column: NDArray[np.intp], kept: Samples | None
-    ) -> Floats:
-        """Premultiplied samples [N, `channels`] at rows and columns [N]; hidden ones are filled."""
+    def _samples(self, row: NDArray[np.intp], column: NDArray[np.intp], moved: Moved) -> Floats:
+        """Premultiplied samples [N, `channels`] at rows and columns [N], filled and unmixed."""
         x, y, width, _ = self.part
+        kept = self.kept(moved)
         at = (row + y) * self.planes.size[0] + (column + x)
         colour, alpha = (
             None if p is None else p.raster.reshape(-1, p.components).take(at, 0)
@@ -309,6 +308,8 @@ class PyramidTexture:
                 colour[outside] = fill[:, :colours]
                 if alpha is not None:
                     alpha[outside] = fill[:, -1:]
+            if self.cuts and (edge := rim(self.planes, self.alpha, self.part, self.cuts, moved)):
+                edge.put(place, colour, alpha)
         return colour if alpha is None else np.concatenate([colour * alpha, alpha], axis=1)
 
 

@@ -122,3 +122,17 @@ def test_when_pixels_stay_is_known(image, removed, small_pxi):
 def test_effort_is_checked(removed):
     with pytest.raises(UsageError, match="effort is 0"):
         removed.purged(0)
+
+
+def test_what_lies_behind_is_kept():
+    """Planes of a view's own have another origin than the part, and all of them can show."""
+    rng = np.random.default_rng(4)
+    picture = rng.integers(0, 256, (70, 90, 3), np.uint8)
+    mask = np.zeros((70, 90), bool)
+    mask[20:50, 30:61] = True
+    behind = np.full_like(picture, (0, 200, 0))
+    image = pxi.encode(picture, masks={"a": mask}, behind=behind, effort=1, texture="pyramid")
+    gone = image.layers["a"].removed()
+    before, after = gone.render(), gone.purged().render()
+    assert (abs(before[28:42, 38:53].astype(int) - (0, 200, 0)) < 30).all()
+    assert (before[28:42, 38:53] == after[28:42, 38:53]).all()

@@ -202,20 +202,17 @@ def test_what_is_apart():
     a, b, c, d = (rectangle(0, 0, 16 * k, 16) for k in (1, 2, 3, 4))
     twin = rectangle(0, 0, 48, 16)
     cuts = Occlusion.of([2, 3, 4], 2, [None, a, b, c, d], PART)
-    rest, mine = [True] * 5, [True] * 5
+    rest = [True] * 5
     stack = [None, a, b, c, d]
-    assert cuts.moved(2, stack, rest, mine) == ALL_IN_PLACE
-    assert cuts.moved(2, [None, a, b, twin, d], rest, mine) == ALL_IN_PLACE
-    assert cuts.moved(2, stack, [*rest[:3], False, True], mine) == Moved(frozenset([c]))
-    assert cuts.moved(2, stack[:4], rest[:4], mine[:4]) == Moved(frozenset([d]))
+    assert cuts.moved(2, stack, rest) == ALL_IN_PLACE
+    assert cuts.moved(2, [None, a, b, twin, d], rest) == ALL_IN_PLACE
+    assert cuts.moved(2, stack, [*rest[:3], False, True]) == Moved(frozenset([c]))
+    assert cuts.moved(2, stack[:4], rest[:4]) == Moved(frozenset([d]))
     behind = ((a, True), (None, False))
-    assert cuts.moved(2, stack, [False, *rest[1:]], mine) == Moved(behind=behind)
-    moved = [False, False, *rest[2:]]
-    assert cuts.moved(2, stack, moved, [True, False, *mine[2:]]) == Moved(behind=behind[1:])
-    assert cuts.moved(2, stack, moved, [False, False, *mine[2:]]) == ALL_IN_PLACE
-    assert cuts.moved(2, [None, a, a, c, d], rest, mine) == Moved(behind=ALL_REMOVED)
+    assert cuts.moved(2, stack, [False, *rest[1:]]) == Moved(behind=behind)
+    assert cuts.moved(2, [None, a, a, c, d], rest) == Moved(behind=ALL_REMOVED)
     fronts = Occlusion.of([3, 4], 2, stack, PART)
-    assert fronts.moved(2, [None, a, a, c, d], moved, mine) == ALL_IN_PLACE
+    assert fronts.moved(2, [None, a, a, c, d], [False, False, *rest[2:]]) == ALL_IN_PLACE
 
 
 @pytest.mark.parametrize("size", [(21, 18), (1, 1), (1, 6), (7, 2), (5, 5)])

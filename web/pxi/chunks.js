@@ -66,12 +66,14 @@ const TEXTURES = [
     coder: int(0, 255), planes: int(0, 2 ** 16), alpha: int(0, 2 ** 16),
     part: ints(0, 2 ** 24, 4), cell: int(0, 6), mask: bytes, cuts: ints(0, 2 ** 16),
     behind: int(0, 2 ** 16), behind_alpha: int(0, 2 ** 16), grain: int(0, 6),
-    offsets: ints(-(2 ** 24), 2 ** 24), sources: bytes,
+    offsets: ints(-(2 ** 24), 2 ** 24), sources: bytes, unmix: int(0, 1),
   },
 ];
 
 /** What a pyramid texture has in files of versions before 0.11 (CON-19). */
-const ABSENT = { behind: 0, behind_alpha: 0, grain: 0, offsets: [], sources: new Uint8Array() };
+const ABSENT = {
+  behind: 0, behind_alpha: 0, grain: 0, offsets: [], sources: new Uint8Array(), unmix: 0,
+};
 
 /** A layer without POSE has this one (chapter 3). */
 export const REST = Object.freeze({

@@ -92,16 +92,29 @@ export class Image {
     });
   }
 
-  /** What layer n shows of its raster; `moving` tells whether it is the picture at a time. */
-  view(n, moving) {
+  /**
+   * What layer n shows of its raster, the last one of which is kept.
+   *
+   * `moving` tells whether it is the picture at a time, `drawn` are the numbers of all layers that
+   * are drawn.
+   */
+  view(n, moving, drawn) {
     const k = this.source(n);
-    const cuts = this.textures[k].cuts.length;
-    return this.#once(cuts ? `view ${n} ${moving}` : `view of ${k}`, () => {
-      const { motion } = this;
-      const bodies = new Map(moving ? motion.layers.map((l, i) => [l, motion.bodies[i]]) : []);
-      const { layers, textures, plans, poses, boundaries, limits } = this;
-      const scene = { layers, textures, plans, poses, boundaries, limits, bodies };
-      return viewOf(scene, n, k, (number) => this.raster(number));
-    });
+    if (!this.textures[k].cuts.length) {
+      return this.#once(`view of ${k}`, () => this.#viewOf(n, k, moving, drawn));
+    }
+    const key = `${moving} ${drawn}`;
+    const last = this.#cache.get(`view ${n}`);
+    if (last?.key === key) return last.view;
+    const view = this.#viewOf(n, k, moving, drawn);
+    this.#cache.set(`view ${n}`, { key, view });
+    return view;
+  }
+
+  #viewOf(n, k, moving, drawn) {
+    const { layers, textures, plans, poses, boundaries, limits, motion } = this;
+    const bodies = new Map(moving ? motion.layers.map((l, i) => [l, motion.bodies[i]]) : []);
+    const scene = { layers, textures, plans, poses, boundaries, limits, bodies, drawn };
+    return viewOf(scene, n, k, (number) => this.raster(number));
   }
 }

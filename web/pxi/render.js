@@ -33,7 +33,7 @@ export function render(image, options = {}) {
   const view = viewOf(region, width, height);
   budget.spend("multiply_adds", drawn.length * view.columns * view.rows * SAMPLE_COST);
   const order = [...drawn].sort((a, b) => b - a);
-  const sheets = order.map((n) => new Sheet(image, n, moves, view, budget));
+  const sheets = order.map((n) => new Sheet(image, n, drawn, moves, view, budget));
   const opaque = image.head.opaque && drawn.includes(0);
   const channels = opaque ? 3 : 4;
   const data = new Float32Array(width * height * channels);
@@ -111,8 +111,8 @@ function average({ width, sx, sy, columns }, { top, bottom }, samples, channels,
 
 /** One layer in one view. */
 class Sheet {
-  constructor(image, n, moves, view, budget) {
-    Object.assign(this, { image, n, budget });
+  constructor(image, n, drawn, moves, view, budget) {
+    Object.assign(this, { image, n, drawn, budget });
     this.layr = image.layers[n];
     this.pose = image.pose(n);
     this.mesh = image.meshes.get(n);
@@ -154,7 +154,7 @@ class Sheet {
   }
 
   #ofView(moving) {
-    const view = this.image.view(this.n, moving);
+    const view = this.image.view(this.n, moving, this.drawn);
     return (us, vs, out) => {
       for (let i = 0; i < us.length; i++) sampleView(view, this.layr.box, us[i], vs[i], out, 4 * i);
     };

@@ -8,24 +8,32 @@ import { Budget } from "./limits.js";
 import { Diffusion } from "./implicit.js";
 import { clamp } from "./integers.js";
 
-/** Whether two layers rest on each other (PYR-46, MOT-9). */
-function rest({ poses, bodies }, a, b) {
-  const [one, other] = [a, b].map((i) => poses.get(i) ?? REST);
-  const plain = (p) =>
-    !p.node_classes.length && !p.place_classes.length && !p.hidden && p.opacity === 65535;
-  const same = (key) => one[key].every((v, i) => v === other[key][i]);
-  return plain(one) && plain(other) && same("matrix") && same("shift") &&
-    bodies.get(a) === bodies.get(b);
+/** Whether a layer rests on layer n, which shows TEXR k (PYR-46, MOT-9). */
+function rest({ layers, textures, poses, bodies, drawn }, n, k, other) {
+  const texr = textures[other].coder === 0 ? textures[textures[other].texture] : textures[other];
+  const [mine, its] = [layers[k].box, layers[other].box];
+  if (!drawn.includes(other) || texr.coder !== 2 || texr.planes !== textures[k].planes) return false;
+  const offset = (box, part, i) => box[i] - part[i];
+  const registered = [0, 1].every((i) =>
+    offset(mine, textures[k].part, i) === offset(its, texr.part, i) &&
+    its[i + 2] === texr.part[i + 2]);
+  const poseOf = (i) => poses.get(i) ?? REST;
+  const [one, two] = [n, other].map(poseOf);
+  const plain = (p) => !p.node_classes.length && !p.place_classes.length && p.opacity === 65535;
+  const same = (key) =>
+    one[key].length === two[key].length && one[key].every((v, i) => v === two[key][i]);
+  return registered && plain(one) && plain(two) && ["matrix", "shift", "colour"].every(same) &&
+    bodies.get(n) === bodies.get(other);
 }
 
-/** Marks what is not within two samples of a spoilt one, in both directions. */
-function far(spoilt, w, h) {
+/** Marks what is not within some samples of a spoilt one, in both directions. */
+function far(spoilt, w, h, reach = 2) {
   const spread = (from, count, step, lines, stride) => {
     const to = new Uint8Array(from.length);
     for (let line = 0; line < lines; line++) {
       for (let i = 0, at = line * stride; i < count; i++, at += step) {
         if (!from[at]) continue;
-        const [first, last] = [Math.max(-2, -i), Math.min(2, count - 1 - i)];
+        const [first, last] = [Math.max(-reach, -i), Math.min(reach, count - 1 - i)];
         for (let k = first; k <= last; k++) to[at + k * step] = 1;
       }
     }
@@ -36,13 +44,14 @@ function far(spoilt, w, h) {
 
 /**
  * Which samples of the part that layer n shows show, and which are trusted (PYR-39 to PYR-41 and
- * PYR-46): two masks, or nulls if all do.
+ * PYR-46): two masks, or nulls if all do. And what is to be unmixed, or null (PYR-52).
  *
- * `scene` has layers, textures, poses, boundaries and bodies, `k` is the number of the TEXR.
+ * `scene` has layers, textures, poses, boundaries, bodies and the numbers of the layers that are
+ * drawn; `k` is the number of the TEXR.
  */
 function masksOf(scene, n, k) {
   const { layers, textures, limits } = scene;
-  const { part, mask, cell, cuts } = textures[k];
+  const { part, mask, cell, cuts, unmix: unmixed } = textures[k];
   const [, , w, h] = part;
   const masked = new Uint8Array(w * h).fill(1);
   if (mask.length) {
@@ -51,9 +60,9 @@ function masksOf(scene, n, k) {
     for (let y = 0, i = 0; y < h; y++) {
       for (let x = 0; x < w; x++, i++) masked[i] = bits[(y >> cell) * wide + (x >> cell)];
     }
-    if (!cuts.length) return { shown: masked, trusted: masked };
+    if (!cuts.length) return { shown: masked, trusted: masked, edge: null };
   }
-  if (!cuts.length) return { shown: null, trusted: null };
+  if (!cuts.length) return { shown: null, trusted: null, edge: null };
   const covered = (c) => {
     if (!layers[c].segments.length) return null;
     const [left, top] = layers[k].box;
@@ -61,37 +70,97 @@ function masksOf(scene, n, k) {
       path.map((p, i) => p - 256 * (i & 1 ? top : left)));
     return coverage(paths, w, 0, h, new Budget(limits));
   };
-  const behind = cuts[0] === k ? bareBehind(scene, n, k, covered, w * h) : null;
-  const some = new Uint8Array(w * h);
+  const fronts = new Uint8Array(w * h); // takes something
   const bare = new Uint8Array(w * h);
-  let shown = masked.slice();
+  const open = masked.slice();
   for (const c of cuts) {
+    if (c === k) continue;
     const cover = covered(c);
-    const all = c > k && !rest(scene, n, c);
+    const rests = rest(scene, n, k, c);
     for (let i = 0; i < w * h; i++) {
-      const taken = c > k ? cover[i] : FULL - cover[i];
-      if (!taken) continue;
-      some[i] = 1;
-      if (taken === FULL) shown[i] = 0;
-      if (c > k ? all : behind[i]) bare[i] = 1;
+      if (!cover[i]) continue;
+      fronts[i] = 1;
+      if (cover[i] === FULL) open[i] = 0;
+      if (!rests) bare[i] = 1;
     }
   }
+  const own = cuts[0] === k ? covered(k) : null;
+  let shown = own ? open.map((v, i) => v & (own[i] > 0)) : open.slice();
   if (!shown.includes(1)) shown = masked;
+  const some = own ? fronts.map((v, i) => v | (own[i] < FULL)) : fronts;
   let trusted = far(some, w, h).map((v, i) => v & masked[i]);
   if (!trusted.includes(1)) trusted = shown;
-  const clear = far(bare, w, h).map((v, i) => v & shown[i]);
-  return { shown: clear.includes(1) ? clear : shown, trusted };
+  far(bare, w, h).forEach((v, i) => (open[i] &= v));
+  const lost = own && bareBehind(scene, n, k, covered, w * h);
+  if (own && !unmixed) {
+    const clear = far(own.map((v, i) => v < FULL && lost[i]), w, h);
+    const left = open.map((v, i) => v & (own[i] > 0) & clear[i]);
+    return { shown: left.includes(1) ? left : shown, trusted, edge: null };
+  }
+  const edge = own && edgeOf(own, open, lost, w, h);
+  const left = open.map((v, i) => v & (!own || (own[i] > 0 && !edge.outer[i])));
+  if (!left.includes(1)) return { shown, trusted, edge: null };
+  if (edge) {
+    const beyond = far(own, w, h, 1);
+    edge.free = masked.map((v, i) => v & beyond[i] & !fronts[i]);
+  }
+  return { shown: left, trusted, edge };
+}
+
+/** The samples at the boundary of the layer, which has the coverage `own` (PYR-52). */
+function edgeOf(own, open, bare, w, h) {
+  const away = far(own.map((v, i) => v < FULL && bare[i]), w, h, 1);
+  const outer = new Uint8Array(w * h);
+  const share = new Map();
+  const at = (x, y) => own[clamp(y, 0, h - 1) * w + clamp(x, 0, w - 1)];
+  for (let i = 0; i < w * h; i++) {
+    if (!open[i] || away[i]) continue;
+    if (2 * own[i] < FULL) {
+      outer[i] = 1;
+      continue;
+    }
+    const [x, y] = [i % w, Math.floor(i / w)];
+    const row = (y) => at(x - 1, y) + 4 * at(x, y) + at(x + 1, y);
+    share.set(i, Math.max((row(y - 1) + 4 * row(y) + row(y + 1)) / (36 * FULL), 0.5));
+  }
+  return { share, outer };
+}
+
+/** The numbers of the samples of a part that are at most `reach` away from sample i. */
+function around(i, reach, w, h) {
+  const [x, y] = [i % w, Math.floor(i / w)];
+  const found = [];
+  for (let v = Math.max(y - reach, 0); v <= Math.min(y + reach, h - 1); v++) {
+    for (let u = Math.max(x - reach, 0); u <= Math.min(x + reach, w - 1); u++) found.push(v * w + u);
+  }
+  return found;
+}
+
+/** Replaces straight colours, and alpha if there is any, at the boundary; `mixed` are those of the
+ * raster (PYR-52). */
+function unmix({ share, outer, free }, mixed, colours, alpha, w, h) {
+  const mean = (values, places) => places.reduce((sum, i) => sum + values[i], 0) / places.length;
+  for (const [i, own] of share) {
+    const beyond = around(i, 3, w, h).filter((j) => free[j]);
+    if (!beyond.length) continue;
+    mixed.forEach((values, c) => {
+      const value = (values[i] - (1 - own) * mean(values, beyond)) / own;
+      colours[c][i] = clamp(value, 0, 1);
+    });
+  }
+  outer.forEach((there, i) => {
+    const beside = there ? around(i, 1, w, h).filter((j) => share.has(j)) : [];
+    if (!beside.length) return;
+    for (const values of [...colours, ...(alpha ? [alpha] : [])]) values[i] = mean(values, beside);
+  });
 }
 
 /** The samples that are bare to layer k itself (PYR-46, second case). */
 function bareBehind(scene, n, k, covered, size) {
-  const { textures } = scene;
   const found = new Uint8Array(size);
   const hidden = new Uint8Array(size);
   for (let b = k - 1; b >= 0; b--) {
-    const below = textures[textures[b].coder === 0 ? textures[b].texture : b];
-    if (below.coder !== 2 || below.planes !== textures[k].planes) continue;
-    const rests = rest(scene, n, b);
+    const rests = rest(scene, n, k, b);
     const cover = covered(b);
     for (let i = 0; i < size; i++) {
       const value = cover ? cover[i] : FULL;
@@ -122,16 +191,17 @@ function componentsOf({ columns, planes }, [x0, y0, w, h]) {
 export function viewOf(scene, n, k, rasters) {
   const { planes, alpha, behind, part } = scene.textures[k];
   const [, , w, h] = part;
-  const { shown, trusted } = masksOf(scene, n, k);
+  const { shown, trusted, edge } = masksOf(scene, n, k);
   const sources = decodeSources(scene.textures[k]);
   let colours = componentsOf(rasters(planes), part);
   let share = alpha ? componentsOf(rasters(alpha - 1), part)[0] : null;
-  if (shown?.includes(0)) {
+  if (edge || shown?.includes(0)) {
     const count = Math.max(colours.length, behind ? scene.plans[behind - 1].components : 1);
     const own = evenly(colours, count).concat(share ?? []);
     const hidden = hiddenOf(scene, k, own, trusted, rasters, sources);
     const merged = own.map((values, c) => values.map((v, i) => (shown[i] ? v : hidden[c][i] / FILL_ONE)));
     share = share && merged.pop();
+    if (edge) unmix(edge, own.slice(0, merged.length), merged, share, w, h);
     colours = merged;
   }
   const channels = share ? 4 : 3;

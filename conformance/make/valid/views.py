@@ -215,6 +215,54 @@ def _pyramid_cuts_bent(n: Numbers) -> Picture:
     return replace(made, layers=Layers(layers))
 
 
+@_case("Some of the layers are drawn: what is mixed with the others does not show",
+       "pyramid: cuts", "pyramid: moved", "render: layers",
+       renders=[WHOLE, {"background": False}, {"layers": ["back", "disc"]},
+                {"layers": ["back", "bar"]}, *_PIECES])  # fmt: skip
+def _pyramid_cuts_subset(n: Numbers) -> Picture:
+    return pieces(n, {})
+
+
+@_case("Two layers are recoloured alike, and differ from what is behind",
+       "pyramid: cuts", "pyramid: moved", "pose: colour matrix")  # fmt: skip
+def _pyramid_cuts_colour(n: Numbers) -> Picture:
+    colour = Pose(colour=(0, 4096, 0, -300, 4096, 0, 0, 200, 0, 0, 2048, 0))
+    return pieces(n, {"disc": colour, "bar": colour})
+
+
+@_case("A layer between two others got another texture: what is mixed with the old one is gone",
+       "pyramid: cuts", "pyramid: moved", "pyramid: planes")  # fmt: skip
+def _pyramid_cuts_other(n: Numbers) -> Picture:
+    return _textured(pieces(n, {}), "disc", view(coded(n, (26, 24))))
+
+
+@_case("Layers show the same planes as what they cut, but elsewhere and stretched",
+       "pyramid: cuts", "pyramid: moved", renders=[WHOLE, CLOSE])  # fmt: skip
+def _pyramid_cuts_elsewhere(n: Numbers) -> Picture:
+    made = pieces(n, {})
+    source = made.planes[0]
+    made = _textured(made, "disc", view(source, part=(6, 3, 26, 24)))
+    return _textured(made, "bar", view(source, part=(10, 7, 14, 13)))
+
+
+@_case("The boundaries of layers are filled, not unmixed", "pyramid: cuts", "pyramid: moved",
+       renders=[WHOLE, CLOSE, {"layers": ["disc"]}])  # fmt: skip
+def _pyramid_cuts_filled(n: Numbers) -> Picture:
+    made = pieces(n, {"disc": Pose(shift=(-4 * 1024, 2 * 1024 + 300))})
+    for each in made.layers[1:]:
+        shown = each.texture
+        assert isinstance(shown, PyramidTexture)
+        assert shown.cuts is not None
+        made = _textured(made, each.name, replace(shown, cuts=replace(shown.cuts, unmix=False)))
+    return made
+
+
+def _textured(made: Picture, name: str, texture: PyramidTexture) -> Picture:
+    """Picture in which a layer shows another texture."""
+    layers = [replace(v, texture=texture) if v.name == name else v for v in made.layers]
+    return replace(made, layers=Layers(layers))
+
+
 def _masked(made: Picture, name: str, mask: _Mask, cell: int) -> Picture:
     """Picture with a mask beside the cuts of a layer."""
     layers = list(made.layers)
