@@ -42,9 +42,9 @@ LINE = 48
 """Places at which the boundary is looked at along a line."""
 
 WEIGHTS = {
-    "bias": 4.387, "path": -0.046, "highest": -4.27, "colour": -1.06, "figure difference": -1.47,
-    "figure": 0.454, "figure there": 0.365, "line": 0.367, "line top": -3.073, "away": -1.034,
-    "away down": -0.469, "away across": -1.545, "frame": 0.147, "walk": 0.203, "shy walk": 0.338,
+    "bias": 5.379, "path": 0.434, "highest": -5.166, "colour": -0.816, "figure difference": -1.401,
+    "figure": 0.319, "figure there": -0.095, "line": 0.33, "line top": -2.903, "away": -1.334,
+    "away down": -0.703, "away across": -1.62, "frame": 0.143, "walk": 0.189, "shy walk": 0.393,
 }  # fmt: skip
 """Logistic regression of "belongs to the object that holds the point" on the measures of
 `Scene.likeness`: `training/pointing.py` fits it."""

@@ -9,7 +9,7 @@ import pytest
 
 from proxyimg_codec.encoder.shapes.maps import MODEL, find_maps
 
-SHA_256 = "1cc666574905e482828e21e98e25428d317301b8c801ce30fc247c558078e859"
+SHA_256 = "38293ba8f34d853aa8b66fe4913665be7677e17d36ecc1206ed92ec9873f11e6"
 
 
 def test_the_network_is_the_one_that_was_measured():
