@@ -92,7 +92,7 @@ def test_the_flag(tool, folder, tmp_path):
     assert dict(image.groups) == {"eyes": None, "iris": "eyes"}
     assert image.depth == 16
     (tmp_path / "parts.pxi").unlink()
-    assert "--stack" in tool("encode", folder, code=2).err
+    assert "--stack" in tool("encode", folder, code=3).err
     assert "folder" in tool("encode", "--stack", folder / "10 hat.webp", code=2).err
     assert "--masks" in tool("encode", "--stack", folder, "--masks", folder, code=2).err
 
