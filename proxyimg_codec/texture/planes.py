@@ -231,6 +231,23 @@ def cells_of(size: tuple[int, int], cell: int) -> tuple[int, int]:
     return -(-size[1] >> cell), -(-size[0] >> cell)
 
 
+def blocks(
+    samples: NDArray[np.bool_], cell: int, shape: tuple[int, int] | None = None
+) -> NDArray[np.bool_]:
+    """Cells that hold any sample of a mask, bool [rows, columns].
+
+    Args:
+        samples: bool [height, width].
+        cell: Binary logarithm of the side of a cell in samples.
+        shape: Rows and columns of cells; by default those that cover the mask.
+    """
+    height, width = samples.shape
+    rows, columns = shape or cells_of((width, height), cell)
+    side = 1 << cell
+    whole = np.pad(samples, ((0, rows * side - height), (0, columns * side - width)))
+    return np.asarray(whole.reshape(rows, side, columns, side).any((1, 3)))
+
+
 def _scale_of(plane: Ints) -> int:
     """Scale index for the differences between a lowest plane and its prediction.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from ...texture.network import Floats
 
@@ -14,6 +15,19 @@ SWEEPS = 16
 """Jacobi iterations at each level."""
 
 CROSS = np.array([[0, 1, 0], [1, 0, 1], [0, 1, 0]], np.float32)
+
+
+def continued_from(value: Floats, known: NDArray[np.bool_]) -> Floats:
+    """Continues values smoothly from known places, as `continued` does.
+
+    Args:
+        value: float32 [H, W, C] values; those that are not known have no influence.
+        known: bool [H, W].
+
+    Returns:
+        float32 [H, W, C]; at known places nearly the values themselves.
+    """
+    return continued(value, np.where(known, np.float32(KNOWN), np.float32(0)))
 
 
 def continued(value: Floats, weight: Floats) -> Floats:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...texture.network import Floats
-from .membrane import KNOWN, continued
+from .membrane import continued_from
 
 REACH = 3
 """Patches are squares of 2 `REACH` + 1 pixels."""
@@ -71,6 +71,7 @@ def guessed(features: Floats, known: Pixels, hole: Pixels, seed: int) -> Guess:
     rng = np.random.default_rng([seed, 17])
     levels = _levels(features, known, hole)
     found: _Level | None = None
+    scale = 1
     for number, (features, seen, wanted) in enumerate(reversed(levels)):
         level = _Level(features, seen, wanted)
         if found is not None and len(level.rows) > MOST:
@@ -79,9 +80,8 @@ def guessed(features: Floats, known: Pixels, hole: Pixels, seed: int) -> Guess:
         for k in range(ROUNDS[min(number, len(ROUNDS) - 1)]):
             level.search(rng, 2 if k else 3)
             level.vote()
-        found = level
+        found, scale = level, 2 ** (len(levels) - 1 - number)
     assert found is not None
-    scale = 2 ** (len(levels) - 1 - number + (found is not level))
     return _enlarged(found, scale, levels[0][0], hole)
 
 
@@ -103,8 +103,7 @@ def features_of(colours: Floats, known: Pixels) -> Floats:
         size = np.abs(np.diff(grey, axis=axis, append=grey.take([-1], axis)))
         planes.append(cv2.GaussianBlur(size * inside, (0, 0), AROUND) / share * TEXTURE)
     features = np.dstack(planes).astype(np.float32)
-    filled = continued(features, np.where(known, np.float32(KNOWN), np.float32(0)))
-    return np.where(known[..., None], features, filled)
+    return np.where(known[..., None], features, continued_from(features, known))
 
 
 def halved(plane: NDArray[Any], whole: bool) -> NDArray[Any]:
@@ -253,10 +252,5 @@ def _enlarged(level: _Level, scale: int, features: Floats, hole: Pixels) -> Gues
     offsets, counts = np.unique(level.offsets[inside][:, ::-1], axis=0, return_counts=True)
     offsets = offsets[np.argsort(-counts, kind="stable")] * scale
     high, wide = hole.shape
-    if scale > 1:
-        larger = cv2.resize(
-            level.features, None, fx=scale, fy=scale, interpolation=cv2.INTER_LINEAR
-        )
-    else:
-        larger = level.features
+    larger = cv2.resize(level.features, None, fx=scale, fy=scale, interpolation=cv2.INTER_LINEAR)
     return Guess(np.where(hole[..., None], larger[:high, :wide], features), offsets)

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from ...container.texr import CELLS_MAX, GRAIN_MAX
 from ...texture.completion import Copies
 from ...texture.network import Floats
-from .membrane import KNOWN, continued
+from ...texture.planes import blocks
+from .membrane import continued_from
 from .patches import Guess, Pixels, Places, features_of, guessed, halved, whole
 
 SIDE = 4
@@ -91,7 +92,7 @@ def references(
         return None
     shape, grain = known.shape, 2
     while grain < GRAIN_MAX:
-        some = blocks(wanted, 1 << grain)
+        some = blocks(wanted, grain)
         if some.sum() <= CELLS and some.size <= CELLS_MAX:
             break
         grain += 1
@@ -119,26 +120,19 @@ def references(
     return Copies(grain, (offsets[used] << (grain - 2)).astype(np.int32), sources)
 
 
-def blocks(mask: Pixels, side: int) -> Pixels:
-    """Cells of `side` pixels that hold a pixel of a mask [H, W]."""
-    high, wide = (-(-n // side) for n in mask.shape)
-    beside = [(0, high * side - mask.shape[0]), (0, wide * side - mask.shape[1])]
-    return np.asarray(np.pad(mask, beside).reshape(high, side, wide, side).any((1, 3)))
-
-
 def _is_busy(features: Floats, known: Pixels, hole: Pixels) -> bool:
     """Whether a smooth fill from farther out misses what is known beside the hole."""
     band = (cv2.dilate(hole.astype(np.uint8), np.ones((13, 13), np.uint8)) > 0) & known
     if not band.any() or not (known & ~band).any():
         return False
     colours = features[..., :3]
-    filled = continued(colours, np.where(known & ~band, np.float32(KNOWN), np.float32(0)))
+    filled = continued_from(colours, known & ~band)
     return bool(np.sqrt(((filled - colours)[band] ** 2).mean()) >= SMOOTH)
 
 
 def _cells(hole: Pixels) -> Cells:
     """Cells of `SIDE` pixels that hold a pixel of a hole."""
-    some = blocks(hole, SIDE)
+    some = blocks(hole, SIDE.bit_length() - 1)
     rows, columns = np.nonzero(some)
     number = np.full((some.shape[0] + 1, some.shape[1] + 1), -1)
     number[rows, columns] = np.arange(len(rows))

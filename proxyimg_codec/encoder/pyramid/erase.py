@@ -20,7 +20,7 @@ from ...texture.grid import Grid, by_channel
 from ...texture.latents import SHIFT_ORIGIN, Latents
 from ...texture.network import Floats
 from ...texture.planes import Planes
-from ..completion.membrane import KNOWN, continued
+from ..completion.membrane import continued_from
 from .encode import CELL, Effort, Job, Raster, tensor
 from .load import load
 from .refine import Target
@@ -81,7 +81,7 @@ class _Erasure(Job):
     def __init__(self, old: Planes, kept: NDArray[np.bool_], gone: NDArray[np.bool_]) -> None:
         self.old, self.gone = old, gone
         self.cell = old.packed["cell"] if old.packed["support"] else CELL
-        cells = _blocks(kept, coded.cells_of(old.size, self.cell), 1 << self.cell)
+        cells = coded.blocks(kept, self.cell)
         # The filters of what is kept reach into the cells beside.
         self.cells = cv2.dilate(cells.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
         if old.packed["support"]:
@@ -131,7 +131,7 @@ class _Erasure(Job):
 
     def _over(self, level: int) -> Tensor:
         """Positions of a level, bool [1, 1, h, w], that lie over samples that go."""
-        found = _blocks(self.gone, self.grid.at(level), 1 << level)
+        found = coded.blocks(self.gone, level, self.grid.at(level))
         return torch.from_numpy(found)[None, None]
 
     def concerns(self, box: Window) -> bool:
@@ -176,14 +176,6 @@ class _Erasure(Job):
 
 def _blanked(samples: Floats, kept: NDArray[np.bool_]) -> Floats:
     """Samples [H, W, C] in which those that are not kept are continued from the others."""
-    smooth = continued(samples, np.where(kept, np.float32(KNOWN), np.float32(0)))
+    smooth = continued_from(samples, kept)
     smooth = np.clip(smooth, samples[kept].min(0), samples[kept].max(0))
     return np.where(kept[..., None], samples, smooth).astype(np.float32)
-
-
-def _blocks(samples: NDArray[np.bool_], shape: tuple[int, int], side: int) -> NDArray[np.bool_]:
-    """Blocks, bool [*shape], of `side` x `side` samples that hold any which is True."""
-    rows, columns = shape
-    h, w = samples.shape
-    whole = np.pad(samples, ((0, rows * side - h), (0, columns * side - w)))
-    return np.asarray(whole.reshape(rows, side, columns, side).any((1, 3)))

@@ -16,11 +16,11 @@ from ...model import Layer, Layers, Picture
 from ...render.quality import psnr
 from ...texture.network import Floats
 from ...texture.occlusion import Occlusion
-from ...texture.planes import Planes, cells_of
+from ...texture.planes import Planes, blocks
 from ...texture.pyramid import PyramidTexture
 from ..completion.behind import Source, pixels_behind
 from ..completion.hidden import copies_of
-from ..completion.membrane import KNOWN, continued
+from ..completion.membrane import continued, continued_from
 from ..settings import Settings
 from ..shapes.coverage import coverage_of
 from ..shapes.layers import Plan
@@ -282,7 +282,7 @@ def _behind(rasters: Sequence[Raster], cuts: Occlusion | None, source: Source) -
     x, y, width, height = cuts.box
     for alpha in rasters[1:]:
         part = alpha.samples[y : y + height, x : x + width]
-        whole = continued(part, np.where(cuts.trusted, np.float32(KNOWN), np.float32(0)))
+        whole = continued_from(part, cuts.trusted)
         made.append(Raster(np.clip(whole, 0, 255), weight, cells, True))
     return made
 
@@ -292,11 +292,7 @@ def _cells(mask: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
 
     None stands for all cells; at least one cell is True.
     """
-    height, width = mask.shape
-    rows, columns = cells_of((width, height), CELL)
-    side = 1 << CELL
-    whole = np.pad(mask, ((0, rows * side - height), (0, columns * side - width)))
-    cells = np.asarray(whole.reshape(rows, side, columns, side).any((1, 3)))
+    cells = blocks(mask, CELL)
     if not cells.any():
         cells[0, 0] = True
     return None if cells.all() else cells
