@@ -126,7 +126,6 @@ def _with_planes(texture: Texture, new: dict[Planes, Planes]) -> Texture:
     """Texture with other planes; itself if it has none of those that are replaced."""
     if not isinstance(texture, PyramidTexture) or not any(p in new for p in texture.sources):
         return texture
-    alpha = None if texture.alpha is None else new.get(texture.alpha, texture.alpha)
-    made = replace(texture, planes=new.get(texture.planes, texture.planes), alpha=alpha)
+    made = texture.renewed({p: new.get(p, p) for p in texture.sources})
     made.__dict__["coded_mask"] = texture.coded_mask  # another encoder may have coded it
     return made

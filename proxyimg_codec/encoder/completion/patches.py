@@ -160,7 +160,7 @@ class _Level:
         depth = cv2.distanceTransform(hole.astype(np.uint8), cv2.DIST_L2, 5)[near]
         self.weight = (FADING**-depth).astype(np.float32)
         self.targets = np.zeros((len(self.rows), 2), np.int64)
-        self.apart = np.full(len(self.rows), np.inf, np.float32)
+        self.apart = np.ones(len(self.rows), np.float32)
 
     @property
     def offsets(self) -> Places:
@@ -184,7 +184,6 @@ class _Level:
         larger = cv2.resize(coarse.features, None, fx=2, fy=2, interpolation=cv2.INTER_LINEAR)
         high, wide = self.hole.shape
         self.features[self.hole] = larger[:high, :wide][self.hole]
-        self.apart[:] = 1
         self.vote()
 
     def search(self, rng: np.random.Generator, times: int) -> None:
