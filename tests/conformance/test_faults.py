@@ -84,7 +84,7 @@ CAUGHT = {
     "believes-histories": ("undo-stale", "exit", "undo"),
     "accepts-contradictions": ("invalid-opaque-moved", "exit", "opaque-posed"),
     "reads-maps-in-all-versions": ("invalid-map", "exit", "version-0-3"),
-    "reads-only-0.11": ("version-0-2", "exit", "layers"),
+    "reads-only-0.12": ("version-0-2", "exit", "layers"),
     "reads-the-future": ("unsupported-version-0-4", "exit", "layers"),
     "accepts-idle-poses": ("invalid-pose-rest", "exit", "moved"),
     "causal-off-by-one": ("pyramid", "exit", "pyramid-sample"),

@@ -58,6 +58,12 @@ def _version_0_10(n: Numbers) -> bytes:
     return write(chunks, (0, 10))
 
 
+@_case("A file of version 0.11, whose pyramid textures end with unmix", "file: version", "CON-19",
+       "pyramid: cuts")  # fmt: skip
+def _version_0_11(n: Numbers) -> bytes:
+    return write(read(to_bytes(pieces(n, {"disc": Pose(shift=(3 * 1024, -900))}))), (0, 11))
+
+
 @_case("A file of version 0.2 with arrays", "file: version", "fields: maps")
 def _arrays_0_2(n: Numbers) -> bytes:
     return write(read(to_bytes(layered(n))), (0, 2))
