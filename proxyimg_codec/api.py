@@ -143,6 +143,7 @@ class Image(PictureHandle, EditableImage):
         engine: str = "auto",
         limits: Limits = DEFAULT_LIMITS,
         progress: Callable[[int], None] | None = None,
+        out: NDArray[Any] | None = None,
     ) -> NDArray[Any]:
         """Renders the picture, or part of it, at any size.
 
@@ -158,16 +159,18 @@ class Image(PictureHandle, EditableImage):
             engine: ``auto``, ``numpy``, ``native`` or ``ort``; ``numpy`` does without the compiled
                 kernel, also for what is decoded only now.
             limits: Bounds on the size of the output and on the work it may take.
-            progress: Called after each tile with the number of its pixels.
+            progress: Called from the first milliseconds on with how much more is done, in output
+                pixels; these add up to all. What it raises ends the work: so it can cancel.
+            out: Array for the pixels, of the shape and type of the result.
 
         Returns:
-            Pixels of type `dtype`: [height, width, 3] if the picture is opaque and its back layer
-            is drawn, otherwise [height, width, 4] with straight alpha.
+            Pixels of type `dtype`, in `out` if it is given: [height, width, 3] if the picture is
+            opaque and its back layer is drawn, otherwise [height, width, 4] with straight alpha.
 
         Raises:
             UsageError: An argument has a wrong type or is out of range, arguments contradict each
-                other, the layer or engine is unknown, no layer is left, or `t` is given for a
-                picture without a timeline.
+                other, the layer or engine is unknown, no layer is left, `out` does not fit, or `t`
+                is given for a picture without a timeline.
             UnsupportedError: The engine, or a package that it needs, is not installed.
             LimitError: The output is too large, takes too much work, or more memory than there is.
             FormatError: A coded stream that is decoded only now is corrupt.
@@ -183,7 +186,7 @@ class Image(PictureHandle, EditableImage):
         return pixels.render(
             self._picture, t=t, width=width, height=height, scale=scale, region=region,
             layers=layers, background=background, dtype=dtype, engine=engine, limits=limits,
-            progress=progress, cache=self.cache,
+            progress=progress, cache=self.cache, out=out,
         )  # fmt: skip
 
     def to_bytes(self) -> bytes:

@@ -12,7 +12,7 @@ from proxyimg_codec.codec import unpack as unpacking
 from proxyimg_codec.entropy import laplace
 from proxyimg_codec.geometry.pose import Pose
 from proxyimg_codec.native import kernel
-from proxyimg_codec.render import compose, neighbours
+from proxyimg_codec.render import compose, neighbours, thumbnail
 from proxyimg_codec.texture import (
     completion,
     context,
@@ -23,6 +23,7 @@ from proxyimg_codec.texture import (
     planes,
     pyramid,
     registered_model,
+    sampling,
     synthesis,
     unmix,
 )
@@ -149,6 +150,21 @@ def _whole(*args: Any) -> PyramidTexture:
     return replace(found, part=(0, 0, *found.planes.size), mask=None, cuts=None)
 
 
+def _seeing(self: Any, window: Any) -> Any:
+    outer = window.grown(context.REACH, self.bands.shape)
+    bands = self.bands[outer.at]
+    low, parent = self.low[:, *outer.at], self.parent[:, *outer.halved().at]
+    return context.Place(self.coder, low, parent, bands), outer
+
+
+def _tiles_down_first(self: Grid, level: int, tile: int) -> Any:
+    return sorted(tiles_of(self, level, tile), key=lambda window: (window.left, window.top))
+
+
+def _off(start: int, span: float, count: int, level: int, size: int) -> Any:
+    return taps_of(start + (1 << level) // 2, span, count, level, size)
+
+
 def _black(value: Any, known: Any) -> Any:
     return np.where(known, value, 0)
 
@@ -216,17 +232,18 @@ def _everywhere_behind(self: PyramidTexture, trusted: Any) -> Any:
     if self.behind is None:
         return known_of(self, trusted)
     own = planes.Planes(self.behind.packed)
-    own.__dict__["raster"] = self.behind.raster
+    own.__dict__["samples"] = self.behind.samples
     own.__dict__["support"] = np.ones_like(self.behind.support)
     return known_of(replace(self, behind=own), trusted)
 
 
 bands_of, mirrored_of, level_of = Grid.bands, grid.mirrored_indices, LevelCoder.__init__
 grid_of, wave_of, escape_of = Grid.of, LevelCoder._wave, latents.Decoder._escape
-position_of, samples_of = pyramid._position, PyramidTexture._samples
+position_of, samples_of = sampling.position, PyramidTexture._samples
 unpack_of, premultiplied_of = pyramid.unpack, compose.premultiplied
 moved_of, known_of = Occlusion.moved, PyramidTexture._known
 still_of, neighbours_of = Pose.still, neighbours.moved_neighbours
+tiles_of, taps_of = Grid.tiles, thumbnail._taps
 copies_of, weights_of, bases_of = completion.unpack, completion._weights, completion._bases
 
 _FAULTS: dict[str, list[Patch]] = {
@@ -255,11 +272,17 @@ _FAULTS: dict[str, list[Patch]] = {
     "codes-certain-latents": [(laplace, "CERTAIN", -1)],
     "escapes-unsigned": [(latents.Decoder, "_escape", _unsigned)],
     "accepts-left-over-escapes": [(latents.Decoder, "finish", lambda self, where: None)],
+    "tiles-see-their-neighbours": [(context.Place, "tile", _seeing)],
+    "tiles-down-first": [(Grid, "tiles", _tiles_down_first)],
+    "reads-small-tiles": [(planes, "TILE_MIN", 0)],
+    "thumbnails-without-too-much": [(thumbnail, "ERROR_MAX", 1e9)],
+    "thumbnails-half-a-sample-off": [(thumbnail, "_taps", _off)],
+    "thumbnails-without-the-gain-of-levels": [(synthesis, "_evenly", lambda *a: np.eye(3) * 0.5)],
     "accepts-large-latents": [(context, "LIMIT", 1 << 20)],
-    "nearest-sample": [(pyramid, "_position", _nearest)],
-    "linear": [(pyramid, "_weights", _linear)],
-    "cubic-sharp": [(pyramid, "_weights", _sharp)],
-    "samples-on-corners": [(pyramid, "_position", _corners)],
+    "nearest-sample": [(sampling, "position", _nearest)],
+    "linear": [(sampling, "weights", _linear)],
+    "cubic-sharp": [(sampling, "weights", _sharp)],
+    "samples-on-corners": [(sampling, "position", _corners)],
     "interpolates-straight": [(PyramidTexture, "_samples", _straight),
         (compose, "premultiplied", _premultiplied)],
     "ignores-part": [(pyramid, "unpack", _whole)],
@@ -280,7 +303,7 @@ _FAULTS: dict[str, list[Patch]] = {
     "keeps-rims-of-what-is-not-drawn": [(compose, "moved_neighbours", _all_drawn)],
     "keeps-rims-of-what-is-bent-or-shines-through": [(Pose, "still", _only_where)],
     "keeps-rims-of-what-is-recoloured": [(Pose, "still", _any_colour)],
-    "keeps-rims-of-another-raster": [(neighbours, "_place", lambda *a: None)],
+    "keeps-rims-of-another-raster": [(neighbours, "place", lambda *a: None)],
     "loses-rims-everywhere": [(Occlusion, "moved", _all_bare)],
     "loses-rims-of-what-moves-together": [(Occlusion, "moved", _back_bares)],
     "ignores-behind": [(pyramid, "unpack", _without("behind", "behind_alpha"))],

@@ -25,7 +25,11 @@ from proxyimg_codec.codec import levels
 from proxyimg_codec.codec.write import to_bytes
 from proxyimg_codec.container import chunks, layr, motn, pose
 from proxyimg_codec.io.png import encode_png
+from proxyimg_codec.model import Picture
 from proxyimg_codec.native import kernel
+from proxyimg_codec.render import thumbnail
+from proxyimg_codec.render.pixels import selected
+from proxyimg_codec.render.view import make_view
 
 from .. import judge, pixels, symbols
 from ..cases import EXIT_CODES, FOLDER, PROFILES
@@ -40,6 +44,9 @@ PROVENANCE = "conformance.make_cases"
 
 PEAK, RMS = 0.05, 0.01
 """Allowed errors in 8-bit levels: ten times those of float32 sums in another order."""
+
+THUMBNAIL = round(255 / 10 ** (45 / 20), 2)
+"""Allowed root mean square error of small views, in 8-bit levels: 45 dB [REN-18]."""
 
 LAST_BITS = 0.01
 """Difference in 8-bit levels that pictures may have from machine to machine."""
@@ -71,7 +78,8 @@ def _valid(name: str, case: Valid) -> Made:
     data = made if isinstance(made, bytes) else to_bytes(made)
     profile, level = levels.profile_and_level(data)
     description = _described(case, numbers.seed)
-    description |= {"profile": profile, "level": level, "renders": _renders(case.renders)}
+    renders = _renders(case.renders, from_bytes(data).picture)
+    description |= {"profile": profile, "level": level, "renders": renders}
     latents = symbols.digest(data)
     if latents:
         description["latents"] = latents
@@ -101,12 +109,24 @@ def _described(case: Valid | Refused, seed: int, *rules: str) -> dict[str, Any]:
     }
 
 
-def _renders(wanted: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Descriptions of renders."""
-    return [
-        {"args": args, "expected": f"expected-{i}.png", "peak": PEAK, "rms": RMS}
-        for i, args in enumerate(wanted, 1)
-    ]
+def _renders(
+    wanted: Sequence[Mapping[str, Any]], shown: Picture | None = None
+) -> list[dict[str, Any]]:
+    """Descriptions of renders, of a picture if that is known."""
+    out = []
+    for i, args in enumerate(wanted, 1):
+        peak, rms = (255, THUMBNAIL) if shown and _thumbnail(shown, **args) else (PEAK, RMS)
+        expected = f"expected-{i}.png"
+        out.append({"args": args, "expected": expected, "peak": peak, "rms": rms})
+    return out
+
+
+def _thumbnail(
+    shown: Picture, layers: Any = None, background: bool = True, time: Any = None, **view: Any
+) -> bool:
+    """Whether decoders may draw a picture from fewer levels [REN-18]."""
+    chosen = selected(shown, layers, background)
+    return thumbnail.raster(shown, chosen, make_view(shown.size, **view)) is not None
 
 
 def _refusal(name: str, data: bytes) -> errors.PxiError:
@@ -228,5 +248,6 @@ def _make(folder: Path, made: Mapping[str, Made]) -> None:
             at = args.pop("time", None)
             # An optional case shows the same picture as the file without its fault.
             shown = REFUSED[KIND_OF[name]][name].base().data if "error" in description else data
-            drawn = from_bytes(shown).render(t=at, **args, dtype=np.uint16, engine="numpy")
+            with mock.patch.object(thumbnail, "raster", return_value=None):
+                drawn = from_bytes(shown).render(t=at, **args, dtype=np.uint16, engine="numpy")
             (target / render["expected"]).write_bytes(encode_png(drawn))

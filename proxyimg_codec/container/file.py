@@ -12,7 +12,10 @@ from .chunks import Chunk, read, write
 from .content import Container, Values
 from .fields import Field, pack, unpack
 
-_STRUCTURE = (layr.TYPE, mesh.TYPE, pose.TYPE, netw.TYPE, plan.TYPE, texr.TYPE)
+_STRUCTURE = (layr.TYPE, mesh.TYPE, pose.TYPE, netw.TYPE, texr.TYPE, plan.TYPE)
+_EARLIER = (*_STRUCTURE[:-2], plan.TYPE, texr.TYPE)
+"""Order before `plan.TILED_FROM`."""
+
 _SINGLE = (meta.CICP_TYPE, meta.INFO_TYPE, tree.TYPE, motn.TYPE, undo.TYPE)
 _BLOCK_NAMES = {type_: name for name, type_ in meta.BLOCKS.items()}
 _FIELDS: dict[str, tuple[Field, ...]] = {
@@ -83,6 +86,7 @@ class _Parts:
     ) -> None:
         self._chunks, self._budget, self._values_of = chunks, budget, values_of
         self._header = values_of(chunks[0])
+        self._order = _STRUCTURE if chunks[0].version >= plan.TILED_FROM else _EARLIER
         self._structure: dict[str, list[Values]] = {t: [] for t in _STRUCTURE}
         self._blocks: dict[str, bytes] = {}
         self._single: dict[str, Values] = {}
@@ -100,7 +104,7 @@ class _Parts:
         """
         where = f"chunk {chunk.type}"
         if chunk.type in _STRUCTURE:
-            stage = _STRUCTURE.index(chunk.type)
+            stage = self._order.index(chunk.type)
             if stage < self._stage or self._blocks or self._single:
                 raise FormatError("out of order", where, chunk.offset, rule="CON-11")
             self._stage = stage
@@ -162,6 +166,8 @@ def fields_of(chunk: Chunk) -> tuple[Field, ...]:
     """
     if chunk.type == texr.TYPE:
         return texr.fields_of(chunk.payload, chunk.version)
+    if chunk.type == plan.TYPE:
+        return plan.fields_of(chunk.version)
     return _FIELDS.get(chunk.type, ())
 
 
@@ -176,6 +182,8 @@ def values(chunk: Chunk) -> Values:
     """
     where = f"chunk {chunk.type}" + ("" if chunk.offset is None else f" at byte {chunk.offset}")
     found = unpack(fields_of(chunk), chunk.payload, where, old=chunk.old)
+    if chunk.type == plan.TYPE:
+        return plan.ABSENT | found
     return texr.ABSENT | found if found.get("coder") == texr.PYRAMID else found
 
 
@@ -189,13 +197,23 @@ def _renewed(steps: tuple[undo.Step, ...]) -> tuple[undo.Step, ...]:
     def renewed(chunk: Chunk) -> Chunk:
         payload = chunk.payload
         with contextlib.suppress(FormatError, UnsupportedError):
-            if chunk.old or chunk.type == texr.TYPE:
+            if chunk.old or chunk.type in (texr.TYPE, plan.TYPE):
                 payload = _packed(chunk.type, values(chunk)) if fields_of(chunk) else payload
         return Chunk(chunk.type, payload)
 
     once = {id(chunk): chunk for step in steps for chunk in step.chunks}
     new = {key: renewed(chunk) for key, chunk in once.items()}
-    return tuple(undo.Step(s.operation, tuple(new[id(c)] for c in s.chunks)) for s in steps)
+    return tuple(
+        undo.Step(s.operation, _in_order(tuple(new[id(c)] for c in s.chunks))) for s in steps
+    )
+
+
+def _in_order(chunks: tuple[Chunk, ...]) -> tuple[Chunk, ...]:
+    """Chunks of a state with PLAN behind TEXR, as in the present version."""
+    last = max((k for k, c in enumerate(chunks) if c.type == texr.TYPE), default=len(chunks))
+    early = [c for c in chunks[:last] if c.type == plan.TYPE]
+    rest = [c for c in chunks[: last + 1] if c.type != plan.TYPE]
+    return (*rest, *early, *chunks[last + 1 :])
 
 
 def _packed(type_: str, own: Values) -> bytes:
@@ -214,17 +232,17 @@ def serialize(c: Container) -> bytes:
 def present(c: Container) -> list[Chunk]:
     """Packs all chunks but uNDO and TAIL.
 
-    Their order is HEAD, LAYR, MESH, POSE, NETW, PLAN, TEXR, metadata, cICp, iNFO, tREE, mOTN,
+    Their order is HEAD, LAYR, MESH, POSE, NETW, TEXR, PLAN, metadata, cICp, iNFO, tREE, mOTN,
     others.
     """
     chunks = [Chunk(head.TYPE, pack(head.FIELDS, c.head))]
     for module, values in (
         (layr, c.layers), (mesh, c.meshes), (pose, c.poses), (netw, c.networks),
-        (plan, c.planes),
     ):  # fmt: skip
         chunks += [Chunk(module.TYPE, pack(module.FIELDS, v)) for v in values]
     for v in c.textures:
         chunks.append(Chunk(texr.TYPE, _packed(texr.TYPE, v)))
+    chunks += [Chunk(plan.TYPE, pack(plan.FIELDS, v)) for v in c.planes]
     for name, block in c.blocks.items():
         chunks.append(Chunk(meta.BLOCKS[name], meta.compress(block)))
     if c.cicp is not None:

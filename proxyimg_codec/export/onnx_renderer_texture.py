@@ -14,7 +14,8 @@ from ..render.neighbours import moved_neighbours
 from ..texture import diffusion, node_sampling
 from ..texture.implicit import ImplicitTexture
 from ..texture.network import Floats
-from ..texture.pyramid import TAPS, PyramidTexture
+from ..texture.pyramid import PyramidTexture
+from ..texture.sampling import TAPS
 from .onnx_graph import Graph, Value
 from .onnx_network import forward
 from .onnx_renderer_warp import Shown

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Hashable, Sequence
 
 import numpy as np
@@ -15,13 +16,17 @@ from ..geometry.warp import Located, Warp
 from ..limits import DEFAULT_LIMITS, SAMPLE_COST_BITS, Budget, Limits
 from ..model import Layer, Picture
 from ..native import kernel
-from ..texture import node_sampling
+from ..texture import node_sampling, sampling
+from ..texture.grid import Window
 from ..texture.implicit import ImplicitTexture
 from ..texture.network import Floats, Network
+from ..texture.occlusion import ALL_IN_PLACE, Moved
+from ..texture.planes import Planes
 from ..texture.pyramid import PyramidTexture
 from . import engines
 from .cache import SAMPLES_MAX, Cache, Sheet
 from .neighbours import moved_neighbours, present_outline
+from .progress import Progress
 from .view import View
 
 TILE_SAMPLES = 1 << 16
@@ -41,10 +46,12 @@ def compose(
     out: Callable[[int, int, Floats], None],
     limits: Limits = DEFAULT_LIMITS,
     cache: Cache | None = None,
+    progress: Callable[[int], None] | None = None,
 ) -> None:
     """Draws layers, and hands finished tiles to a function.
 
-    What a layer was mixed with, of neighbours that are not drawn, does not show [PYR-46].
+    What a layer was mixed with, of neighbours that are not drawn, does not show [PYR-46]. First the
+    parts of planes that are needed are decoded.
 
     Args:
         picture: Picture that the layers belong to.
@@ -55,6 +62,8 @@ def compose(
             [h, w, 4] premultiplied colour and alpha in 0..1.
         limits: Bounds on the work.
         cache: Colours computed before; this call adds to them.
+        progress: Called again and again with how much more is done, in output pixels; these add up
+            to all. What it raises ends the work.
 
     Raises:
         UsageError: The engine is unknown.
@@ -62,24 +71,32 @@ def compose(
         LimitError: The work would exceed `limits`.
         FormatError: A coded stream that is decoded only now is corrupt.
     """
-    sx, sy = view.supersampling
     budget, cache = Budget(limits), cache or Cache()
-    samples = view.width * sx * view.height * sy
-    budget.spend("multiply_adds", len(layers) * samples << SAMPLE_COST_BITS)
     drawn = frozenset(layers)
+    moved = [moved_neighbours(picture, layer, drawn) for layer in layers]
+    sx, sy = view.supersampling
+    samples = len(layers) * view.width * sx * view.height * sy
+    budget.spend("multiply_adds", samples << SAMPLE_COST_BITS)
+    views = [v.texture for v in layers if isinstance(v.texture, PyramidTexture)]
+    solid = all(v.alpha is None for v in views)
     painters = [
-        _Painter(picture, layer, drawn, view, engine, budget, cache) for layer in reversed(layers)
+        _Painter(picture, layer, apart, solid, view, engine, budget, cache)
+        for layer, apart in zip(reversed(layers), reversed(moved), strict=True)
     ]
+    told = Progress(view.width * view.height, progress)
+    needs = [p.needs for p in painters if p.needs is not None]
+    told.decode(needs)
     tile_w = max(min(view.width, TILE_SAMPLES // (sx * sy)), 1)
     tile_h = max(TILE_SAMPLES // (tile_w * sx * sy), 1)
     for row in range(0, view.height, tile_h):
         h = min(tile_h, view.height - row)
         for column in range(0, view.width, tile_w):
             w = min(tile_w, view.width - column)
-            tile = _tile(painters, (column * sx, row * sy, w * sx, h * sy))
-            if sx * sy > 1:
-                tile = tile.reshape(h, sy, w, sx, 4).mean((1, 3), dtype=np.float32)
-            out(row, column, tile)
+            with told.drawing(w * h):
+                tile = _tile(painters, (column * sx, row * sy, w * sx, h * sy))
+                if sx * sy > 1:
+                    tile = tile.reshape(h, sy, w, sx, 4).mean((1, 3), dtype=np.float32)
+                out(row, column, tile)
 
 
 def _tile(painters: Sequence[_Painter], box: Rectangle) -> Floats:
@@ -108,7 +125,7 @@ class _Painter:
     """Renderer of one layer on the sample grid of one view."""
 
     def __init__(
-        self, picture: Picture, layer: Layer, drawn: frozenset[Layer], view: View, engine: str,
+        self, picture: Picture, layer: Layer, moved: Moved, solid: bool, view: View, engine: str,
         budget: Budget, cache: Cache,
     ) -> None:  # fmt: skip
         self._picture, self._layer, self._view = picture, layer, view
@@ -117,13 +134,49 @@ class _Painter:
         self._run = engines.find(engine)
         self.native = self._run is engines.run_native
         self._network = picture.network_of(layer)
-        self._moved = moved_neighbours(picture, layer, drawn)
+        self._moved = moved
         self._paths = outline(present_outline(picture, layer), view)
         self._warp = Warp(layer.pose, layer.mesh, layer.sampling in (1, 2), budget)
         sx, sy = view.supersampling
         small = view.width * sx * view.height * sy <= SAMPLES_MAX
         # A moment of a motion is drawn only once. Caching it would displace sheets of still layers.
         self._caching = small and layer.pose.sway is None
+        # What lies in front in its place hides the same samples as cuts do, if it is not clear.
+        texture = layer.texture
+        self._seen = (
+            isinstance(texture, PyramidTexture)
+            and solid
+            and moved == ALL_IN_PLACE
+            and texture.mask is None
+            and (texture.cuts is None or texture.cuts.within is None)
+        )
+        self._window = self._needed()
+
+    def _needed(self) -> Window | None:
+        """Samples of the part of a pyramid texture that the view needs; None if it may be all."""
+        texture, box, pose = self._layer.texture, self._layer.box, self._layer.pose
+        view = self._view
+        if not isinstance(texture, PyramidTexture) or pose.affine or pose.bent:
+            return None
+        spans = []
+        for start, extent, k in ((view.y, view.region_height, 1), (view.x, view.region_width, 0)):
+            scale, count = texture.part[k + 2] / box[k + 2], texture.part[k + 2]
+            first, last = ((at - box[k]) * scale for at in (start, start + extent))
+            spans += [
+                min(max(math.floor(first) - sampling.TAPS, 0), count - 1),
+                max(min(math.ceil(last) + sampling.TAPS, count), 1),
+            ]
+        return Window(*spans)
+
+    @property
+    def needs(self) -> tuple[Planes, Window] | None:
+        """Planes of the layer and the samples of their raster to decode; None if there are none."""
+        texture = self._layer.texture
+        if not isinstance(texture, PyramidTexture):
+            return None
+        x, y, width, height = texture.part
+        w = self._window or Window(0, height, 0, width)
+        return texture.planes, Window(w.top + y, w.bottom + y, w.left + x, w.right + x)
 
     def sheet(self, box: Rectangle) -> Sheet:
         """Returns the sheet of a rectangle x, y, w, h of samples, with the colours known so far."""
@@ -188,9 +241,10 @@ class _Painter:
         shown = self._warp.locate(x, y, face)
         texture = layer.texture
         if isinstance(texture, PyramidTexture):
-            return premultiplied(
-                texture.sample(shown.x, shown.y, layer.box, self._moved, self.native)
+            sampled = texture.sample(
+                shown.x, shown.y, layer.box, self._moved, self.native, self._window, self._seen
             )
+            return premultiplied(sampled)
         network = self._network
         assert network is not None, "an implicit texture has a network"
         cost = network.shape.parameters

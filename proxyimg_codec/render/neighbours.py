@@ -74,15 +74,15 @@ def _moved(layer: Layer, layers: Sequence[Layer], home: int, drawn: frozenset[La
     view = layer.texture
     if not isinstance(view, PyramidTexture) or view.cuts is None:
         return ALL_IN_PLACE
-    raster = _place(view, view.cuts.box)
+    raster = place(view, view.cuts.box)
     still = [
-        {v, layer} <= drawn and v.pose.still(layer.pose) and _place(v.texture, v.box) == raster
+        {v, layer} <= drawn and v.pose.still(layer.pose) and place(v.texture, v.box) == raster
         for v in layers
     ]
     return view.cuts.moved(home, [v.boundary for v in layers], still)
 
 
-def _place(texture: Texture, box: Box) -> tuple[Planes, int, int] | None:
+def place(texture: Texture, box: Box) -> tuple[Planes, int, int] | None:
     """Planes that a texture shows over a box, and where on the canvas they begin.
 
     It is None if there are no planes, or they are stretched.

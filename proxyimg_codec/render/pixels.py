@@ -14,6 +14,7 @@ from ..errors import UsageError
 from ..limits import DEFAULT_LIMITS, Limits, enough_memory
 from ..model import Layer, Pictured
 from ..native import kernel
+from . import engines, thumbnail
 from .cache import Cache
 from .compose import compose
 from .moment import at
@@ -35,12 +36,13 @@ def render(
     limits: Limits = DEFAULT_LIMITS,
     progress: Callable[[int], None] | None = None,
     cache: Cache | None = None,
+    out: NDArray[Any] | None = None,
 ) -> NDArray[Any]:
-    """Renders a picture, or part of it, at any size.
+    """Renders a picture, or part of it, at any size: see `api.Image.render`.
 
     Args:
         image: The picture.
-        t: Time in seconds in the timeline of the picture; by default the still is drawn.
+        t: Time in seconds in the timeline; by default the still is drawn.
         width: Output columns; without `height`, the aspect ratio is kept.
         height: Output rows; without `width`, the aspect ratio is kept.
         scale: Output pixels per canvas pixel, instead of `width` and `height`.
@@ -48,23 +50,18 @@ def render(
         layers: Names or positions of the layers to draw; by default all that are not hidden.
         background: Whether to draw the back layer of an opaque picture.
         dtype: uint8 or uint16 (rounded), or float32 in 0..1.
-        engine: ``auto``, ``numpy``, ``native`` or ``ort``; ``numpy`` does without the compiled
-            kernel, also for what is decoded only now.
-        limits: Bounds on the size of the output and on the work it may take.
-        progress: Called after each tile with the number of its pixels.
+        engine: ``auto``, ``numpy``, ``native`` or ``ort``.
+        limits: Bounds on the output and on the work.
+        progress: Called with how much more is done, in output pixels; what it raises ends it.
         cache: Colours computed before; this call adds to them.
+        out: Array for the pixels, of the shape and type of the result; by default a new one.
 
     Returns:
         Pixels of type `dtype`: [height, width, 3] if the picture is opaque and its back layer is
         drawn, otherwise [height, width, 4] with straight alpha.
 
     Raises:
-        UsageError: An argument has a wrong type or is out of range, arguments contradict each
-            other, the layer or engine is unknown, no layer is left, or `t` is given for a picture
-            without a timeline.
-        UnsupportedError: The engine, or a package that it needs, is not installed.
-        LimitError: The output is too large, takes too much work, or more memory than there is.
-        FormatError: A coded stream that is decoded only now is corrupt.
+        UsageError, UnsupportedError, LimitError, FormatError: As `api.Image.render`.
     """
     picture = image.picture if t is None else at(image.picture, t)
     kind = _sample_type(dtype)
@@ -73,27 +70,48 @@ def render(
     if not isinstance(limits, Limits) or not (progress is None or callable(progress)):
         raise UsageError("limits must be Limits, and progress a function of one number")
     limits.check("output_pixels", view.width * view.height)
-    solid = picture.opaque and bool(chosen) and chosen[0] is picture.layers[0]
+    solid = picture.opaque and chosen[:1] == [picture.layers[0]]
+    shape = view.height, view.width, 3 if solid else 4
     with kernel.for_engine(engine), enough_memory("to draw the picture; ask for a smaller one"):
-        result = np.empty((view.height, view.width, 3 if solid else 4), kind)
-        put = partial(_put, result, progress)
-        compose(picture, view, chosen, engine, put, limits, cache)
+        result = _fitting(out, shape, kind)
+        put = partial(_put, result)
+        planes = thumbnail.raster(picture, chosen, view)
+        engines.find(engine)
+        if planes is not None:
+            thumbnail.draw(planes, view, put, progress)
+        else:
+            compose(picture, view, chosen, engine, put, limits, cache, progress)
     return result
+
+
+def _fitting(out: Any, shape: tuple[int, ...], kind: np.dtype[Any]) -> NDArray[Any]:
+    """Array that is to hold pixels: a new one, or one that is given.
+
+    Raises:
+        UsageError: It is no array that can.
+    """
+    if out is None:
+        return np.empty(shape, kind)
+    wanted = f"out must be a writeable array of shape {shape} and type {kind}"
+    if not isinstance(out, np.ndarray):
+        raise UsageError(f"{wanted}; it is a {type(out).__name__}")
+    if out.shape != shape or out.dtype != kind:
+        raise UsageError(f"{wanted}; it has shape {out.shape} and type {out.dtype}")
+    if not out.flags.writeable:
+        raise UsageError(f"{wanted}; it is read-only")
+    return out
 
 
 def _put(
     result: NDArray[Any],
-    progress: Callable[[int], None] | None,
     row: int,
     column: int,
     tile: NDArray[np.float32],
 ) -> None:
-    """Puts a finished tile, premultiplied [h, w, 4], in its place in the result."""
+    """Puts a finished tile, premultiplied [h, w, 4] or opaque [h, w, 3], in its place."""
     h, w = tile.shape[:2]
     finished = _finished(tile, result.shape[2] == 3, result.dtype)
     result[row : row + h, column : column + w] = finished
-    if progress:
-        progress(h * w)
 
 
 def _sample_type(dtype: Any) -> np.dtype[Any]:

@@ -7,15 +7,16 @@ probabilities (spec chapter 8).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..entropy import laplace
+from . import registered_model
 from .convolution import by_row, convolved, strips
-from .grid import Bands, mirrored_indices
+from .grid import Bands, Window, mirrored_indices
 from .network import Floats
 from .registered_model import CAUSAL, STEP_ORIGIN, Array, Context
 
@@ -23,6 +24,13 @@ Ints = NDArray[np.int32]
 
 LIMIT = 1 << 16
 """Bound of the magnitude of latents, so that no sum overflows."""
+
+SHIFT_ORIGIN = 8
+"""Number added to a shift of the scale index when it is stored."""
+
+REACH = 4
+"""Positions around a tile, on all sides, whose coarser levels its context depends on: 3, made even.
+"""
 
 BAD_ESCAPES = "the list of escapes is truncated or corrupt"
 BAD_LATENT = f"a latent is not between {-LIMIT} and {LIMIT}"
@@ -172,8 +180,9 @@ class LevelCoder:
         self._from, self._chroma = _matrix(w.from_luma.values.T), _matrix(w.chroma.values.T)
 
     def code(
-        self, coder: Coder, low: Ints, parent: Ints, bands: Bands, values: Ints | None
-    ) -> Ints:
+        self, coder: Coder, low: Ints, parent: Ints, bands: Bands, values: Ints | None,
+        out: Ints | None = None,
+    ) -> Ints:  # fmt: skip
         """Encodes or decodes a level.
 
         Args:
@@ -182,6 +191,7 @@ class LevelCoder:
             parent: int32 [9, ceil(h / 2), ceil(w / 2)] latents of the coarser level, or zeros.
             bands: uint8 [h, w], bit b set where band b is coded; other latents are 0.
             values: int32 [9, h, w] latents to encode; None to decode.
+            out: int32 [9, h, w] zeros for the result; by default new ones.
 
         Returns:
             int32 [9, h, w] latents.
@@ -190,7 +200,8 @@ class LevelCoder:
         ahead = self._ahead(low, parent)  # [h * w, C]
         pitch = w + 4
         seen = np.zeros(((h + 2) * pitch, 18), np.int8)
-        latents = np.zeros((9, h * w), np.int32)
+        out = np.zeros((9, h, w), np.int32) if out is None else out
+        latents = out.reshape(9, -1)
         source = None if values is None else values.reshape(9, -1)
         offsets = np.array([dy * pitch + dx for dy, dx in CAUSAL])
         for wave in waves(bands > 0):
@@ -203,7 +214,7 @@ class LevelCoder:
             latents[:, at] = found.T
             seen[place, :9] = _squashed(found, 1)
             seen[place, 9:] = log_feature(found)
-        return latents.reshape(9, h, w)
+        return out
 
     def _wave(
         self, coder: Coder, ahead: NDArray[np.int16], around: Floats, there: NDArray[np.bool_],
@@ -277,6 +288,47 @@ class LevelCoder:
             z = np.clip(scaled(z, -w.second.exponent - 3), -(1 << 15), (1 << 15) - 1)
             out[top * width : bottom * width] = z
         return out
+
+
+class Place(NamedTuple):
+    """Level to code, or a part of it, with what its context depends on.
+
+    Attributes:
+        coder: Coder of the level, with the weights of its network.
+        low: int32 [3, h, w] plain planes in 1/16.
+        parent: int32 [9, ceil(h / 2), ceil(w / 2)] latents of the coarser level, or zeros.
+        bands: uint8 [h, w], bit b set where band b is coded.
+    """
+
+    coder: LevelCoder
+    low: Ints
+    parent: Ints
+    bands: Bands
+
+    @classmethod
+    def of(
+        cls, fields: Mapping[str, Any], level: int, low: Ints, parent: Ints, bands: Bands
+    ) -> Place:
+        """Place of a level of a PLAN; `low`, `parent` and `bands` are the attributes.
+
+        Raises:
+            UnsupportedError: The model is unknown.
+        """
+        weights = registered_model.registered(fields["model"])
+        shifts = [v - SHIFT_ORIGIN for v in fields["shifts"][2 * level - 2 : 2 * level]]
+        coder = LevelCoder(
+            weights.context[min(level, registered_model.LEVEL_SETS) - 1],
+            fields["step"], level <= fields["grey"], (shifts[0], shifts[1]),
+        )  # fmt: skip
+        return cls(coder, low, parent, bands)
+
+    def tile(self, window: Window) -> tuple[Place, Window]:
+        """Place of a tile, and the window that it has with what its context depends on."""
+        outer = window.grown(REACH, self.bands.shape)
+        bands = np.zeros(outer.shape, np.uint8)
+        bands[window.inside(outer)] = self.bands[window.at]
+        low, parent = self.low[:, *outer.at], self.parent[:, *outer.halved().at]
+        return Place(self.coder, low, parent, bands), outer
 
 
 def _matrix(values: NDArray[Any]) -> Floats:

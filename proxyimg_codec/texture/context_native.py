@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes as ct
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +12,7 @@ from ..entropy import laplace, rans
 from ..errors import FormatError, LimitError
 from ..native import kernel
 from . import context
-from .context import Ints, LevelCoder
-from .grid import Bands
+from .context import Ints, Place
 
 WEIGHTS = (
     "first", "first_bias", "second", "second_bias", "causal", "mix", "mix_bias", "luma",
@@ -79,23 +78,7 @@ class _Level(ct.Structure):
     ]
 
 
-class Place(NamedTuple):
-    """Level to code, with its inputs; arrays are those of `LevelCoder.code`.
-
-    Attributes:
-        coder: Coder of the level, with the weights of its network.
-        low: int32 [3, h, w] plain planes in 1/16.
-        parent: int32 [9, ceil(h / 2), ceil(w / 2)] latents of the coarser level, or zeros.
-        bands: uint8 [h, w], bit b set where band b is coded.
-    """
-
-    coder: LevelCoder
-    low: Ints
-    parent: Ints
-    bands: Bands
-
-
-def decode(at: Place, stream: rans.Decoder, escapes: bytes, used: int) -> tuple[Ints, int]:
+def decode(at: Place, stream: rans.Decoder, escapes: bytes, used: int, out: Ints) -> int:
     """Decodes a level.
 
     Args:
@@ -103,9 +86,11 @@ def decode(at: Place, stream: rans.Decoder, escapes: bytes, used: int) -> tuple[
         stream: The entropy-coded stream, which is advanced.
         escapes: The list of escapes.
         used: Number of bytes of `escapes` that were read before.
+        out: int32 [9, h, w] zeros that are replaced by the latents; by those that were read before
+            an error, too.
 
     Returns:
-        int32 [9, h, w] latents, and the number of bytes of `escapes` read by now.
+        The number of bytes of `escapes` read by now.
 
     Raises:
         FormatError: The stream or the list of escapes is too short or corrupt, or a latent is out
@@ -118,10 +103,10 @@ def decode(at: Place, stream: rans.Decoder, escapes: bytes, used: int) -> tuple[
         kernel.pointer(words), kernel.pointer(states), kernel.pointer(listed),
         len(words), stream.used, len(listed), used, stream.lanes,
     )  # fmt: skip
-    level, latents = _run(at, None, source, _Sink())
+    level = _run(at, None, source, _Sink(), out)
     stream.states[:] = states
     stream.used = level.source.used
-    return latents, level.source.escapes_used
+    return int(level.source.escapes_used)
 
 
 def encode(at: Place, values: Ints, stream: rans.Encoder) -> tuple[Ints, NDArray[np.int64]]:
@@ -143,14 +128,15 @@ def encode(at: Place, values: Ints, stream: rans.Encoder) -> tuple[Ints, NDArray
     start, freq = np.empty(2 * most, np.uint16), np.empty(2 * most, np.uint16)
     ends, escapes = np.empty(4 * (w + 3 * h), np.int64), np.empty(most, np.int64)
     sink = _Sink(*(kernel.pointer(a) for a in (start, freq, ends, escapes)))
-    level, latents = _run(at, values, _Source(), sink)
+    latents = np.zeros((9, h, w), np.int32)
+    level = _run(at, values, _Source(), sink, latents)
     groups, symbols = level.sink.n_groups, level.sink.n_symbols
     stream.put_groups(start[:symbols].copy(), freq[:symbols].copy(), ends[:groups])
     return latents, escapes[: level.sink.n_escapes].copy()
 
 
-def _run(at: Place, values: Ints | None, source: _Source, sink: _Sink) -> tuple[_Level, Ints]:
-    """Calls the kernel, and returns its structure after the call, and the latents."""
+def _run(at: Place, values: Ints | None, source: _Source, sink: _Sink, latents: Ints) -> _Level:
+    """Calls the kernel, which puts the latents, and returns its structure after the call."""
     lib = kernel.library()
     assert lib is not None, "check available() first"
     coder, weights = at.coder, at.coder.weights
@@ -163,7 +149,6 @@ def _run(at: Place, values: Ints | None, source: _Source, sink: _Sink) -> tuple[
         return kernel.pointer(alive[-1])
 
     parts = {n: getattr(weights, n).values for n in WEIGHTS} | {"first_bias": coder.first_bias}
-    latents = np.zeros((9, h, w), np.int32)
     level = _Level(
         _Net(
             *(address(parts[n], np.int32) for n in WEIGHTS),
@@ -191,4 +176,4 @@ def _run(at: Place, values: Ints | None, source: _Source, sink: _Sink) -> tuple[
         raise FormatError(context.BAD_LATENT, rule="PYR-12")
     if wrong:
         raise LimitError("there is not enough memory to code a pyramid")
-    return level, latents
+    return level

@@ -16,6 +16,68 @@ BANDS = ((0, 1), (1, 0), (1, 1))
 """Bands of the three latents of a colour at a position: (vertical, horizontal), 1 = high pass."""
 
 
+class Window(NamedTuple):
+    """Rectangle of a plane: rows `top` .. `bottom` - 1 and columns `left` .. `right` - 1."""
+
+    top: int
+    bottom: int
+    left: int
+    right: int
+
+    @classmethod
+    def whole(cls, shape: tuple[int, int]) -> Window:
+        """Window of a whole plane of these rows and columns."""
+        return cls(0, shape[0], 0, shape[1])
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return self.bottom - self.top, self.right - self.left
+
+    @property
+    def area(self) -> int:
+        """Number of positions."""
+        return self.shape[0] * self.shape[1]
+
+    def grown(self, by: int, shape: tuple[int, int]) -> Window:
+        """Window with more rows and columns on all sides, as far as a plane of a shape has them."""
+        rows, columns = shape
+        return Window(
+            max(self.top - by, 0), min(self.bottom + by, rows),
+            max(self.left - by, 0), min(self.right + by, columns),
+        )  # fmt: skip
+
+    def halved(self) -> Window:
+        """Window of the next coarser plane that lies over this one."""
+        return Window(self.top // 2, -(-self.bottom // 2), self.left // 2, -(-self.right // 2))
+
+    def doubled(self, shape: tuple[int, int]) -> Window:
+        """Window of the next finer plane, of a shape, that lies under this one."""
+        rows, columns = shape
+        return Window(
+            2 * self.top, min(2 * self.bottom, rows), 2 * self.left, min(2 * self.right, columns)
+        )
+
+    def common(self, other: Window) -> Window:
+        """Window of what two windows share, which must not be nothing."""
+        return Window(
+            max(self.top, other.top), min(self.bottom, other.bottom),
+            max(self.left, other.left), min(self.right, other.right),
+        )  # fmt: skip
+
+    def inside(self, outer: Window) -> tuple[slice, slice]:
+        """Rows and columns of the window in an array of those of an outer one."""
+        return (
+            slice(self.top - outer.top, self.bottom - outer.top),
+            slice(self.left - outer.left, self.right - outer.left),
+        )
+
+    @property
+    def at(self) -> tuple[slice, slice]:
+        """Rows and columns of the window in an array of the whole plane."""
+        return slice(self.top, self.bottom), slice(self.left, self.right)
+
+
 class Grid(NamedTuple):
     """Sizes of the planes of a raster.
 
@@ -50,6 +112,22 @@ class Grid(NamedTuple):
         )
         return rows, columns
 
+    def tiles(self, level: int, tile: int) -> list[Window]:
+        """Tiles of a level that has restart points, row by row; none if it has no such points.
+
+        Args:
+            level: Number of the level, from 1, the finest.
+            tile: Binary logarithm of the side of a tile in positions; 0 = no tiles.
+        """
+        (rows, columns), side = self.at(level), 1 << tile
+        if not tile or max(rows, columns) <= side:
+            return []
+        return [
+            Window(y, min(y + side, rows), x, min(x + side, columns))
+            for y in range(0, rows, side)
+            for x in range(0, columns, side)
+        ]
+
     def bands(self, cells: NDArray[np.bool_], cell: int, level: int) -> Bands:
         """Finds the latents of a level that are coded.
 
@@ -67,7 +145,9 @@ class Grid(NamedTuple):
             `BANDS` are coded.
         """
         over = np.zeros(self.at(level), bool)
-        if level < cell:
+        if cells.all():
+            over[: -(-self.size[1] >> level), : -(-self.size[0] >> level)] = True
+        elif level < cell:
             side = 1 << (cell - level)
             w, h = (-(-n >> level) for n in self.size)
             over[:h, :w] = cells.repeat(side, 0).repeat(side, 1)[:h, :w]

@@ -1,12 +1,13 @@
 """Stream of latents: the lowest planes, then the levels, each in the context of those before.
 
-`steps` goes through the stream for both `Encoder` and `Decoder`. At each place, an encoder writes
-the given latents, and a decoder reads them.
+The same code serves `Encoder` and `Decoder`: at each place, an encoder writes the given latents,
+and a decoder reads them. Fine levels may be coded in tiles, each with a stream of its own, so that
+`decoding` can begin at any of them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,12 +16,9 @@ from numpy.typing import NDArray
 from ..entropy import laplace, rans
 from ..errors import FormatError
 from ..native import kernel
-from . import context, context_native, registered_model
-from .context import Ints
+from . import context, context_native
+from .context import Ints, Place
 from .grid import Grid
-
-SHIFT_ORIGIN = 8
-"""Number added to a shift of the scale index when it is stored."""
 
 
 class Latents(NamedTuple):
@@ -46,85 +44,61 @@ def encode(
         latents: The latents.
 
     Returns:
-        `data` and `escapes` of PLAN: the entropy-coded stream, and the values that have no symbol.
+        `data` and `escapes` of PLAN: the entropy-coded streams, and the values of the first one
+        that have no symbol.
     """
-    coder = Encoder()
-    for _ in steps(coder, fields, cells, latents):
-        pass
-    return coder.stream.finish(), coder.escapes()
+    coder, grid, tiles = Encoder(), Grid.of(fields), []
+    lowest = code_lowest(coder, fields, grid.at(grid.levels), latents)
+    plain, parent = lowest << 4, above(grid)
+    for level in range(grid.levels, 0, -1):
+        given = latents.levels[level - 1]
+        here = Place.of(fields, level, plain, parent, grid.bands(cells, fields["cell"], level))
+        if windows := grid.tiles(level, fields["tile"]):
+            parent = np.zeros_like(given)
+            for window in windows:
+                if here.bands[window.at].any():
+                    part, outer = here.tile(window)
+                    own = Encoder()
+                    coded = own.level(part, given[:, *outer.at])
+                    parent[:, *window.at] = coded[:, *window.inside(outer)]
+                    tiles.append(own.tile())
+        else:
+            parent = coder.level(here, given)
+        if level > 1:
+            plain = context.next_plain(plain, parent, grid.at(level - 1))
+    return b"".join([coder.stream.finish(), *tiles]), coder.escapes()
 
 
-def decode(fields: Mapping[str, Any], cells: NDArray[np.bool_], where: str) -> Latents:
-    """Decodes latents.
-
-    Args:
-        fields: Values of PLAN.
-        cells: bool [rows, columns] cells that have latents.
-        where: Name of the chunk in error messages.
-
-    Raises:
-        FormatError: The stream is corrupt.
-        UnsupportedError: The model is unknown.
-    """
-    coder = Decoder(fields["data"], fields["escapes"])
-    lowest, *found = steps(coder, fields, cells, None)
-    coder.finish(where)
-    return Latents(tuple(found[::-1]), lowest)
+def above(grid: Grid) -> Ints:
+    """Latents above those of the coarsest level, which there are none of: zeros [9, h, w]."""
+    rows, columns = grid.at(grid.levels)
+    return np.zeros((9, -(-rows // 2), -(-columns // 2)), np.int32)
 
 
-def steps(
-    coder: Encoder | Decoder, fields: Mapping[str, Any], cells: NDArray[np.bool_],
-    values: Latents | None,
-) -> Iterator[Ints]:  # fmt: skip
-    """Codes the lowest planes, then each level, the coarsest first.
+def code_lowest(
+    coder: context.Coder, fields: Mapping[str, Any], shape: tuple[int, int],
+    values: Latents | None, cut: bool = False,
+) -> Ints:  # fmt: skip
+    """Codes the lowest planes by ascending x + y, each value predicted from above and left.
 
     Args:
         coder: The encoder or decoder.
         fields: Values of PLAN.
-        cells: bool [rows, columns] cells that have latents.
+        shape: Rows and columns of the planes.
         values: Latents to encode; None for a decoder.
+        cut: Whether the stream may end early; what is missing is as predicted.
 
-    Yields:
-        The lowest planes, int32 [3, h, w], then the latents of each level, int32 [9, h, w].
+    Returns:
+        int32 [3, h, w] lowest planes.
 
     Raises:
-        FormatError: The stream is corrupt.
-        UnsupportedError: The model is unknown.
+        FormatError: The stream is corrupt, or has not even the first values.
     """
-    weights = registered_model.registered(fields["model"])
-    grid, step = Grid.of(fields), fields["step"]
-    rows, columns = grid.at(grid.levels)
-    lowest = _code_lowest(coder, fields, (rows, columns), values)
-    yield lowest
-    plain = lowest << 4
-    parent = np.zeros((9, -(-rows // 2), -(-columns // 2)), np.int32)
-    for level in range(grid.levels, 0, -1):
-        shifts = fields["shifts"][2 * level - 2 : 2 * level]
-        here = context.LevelCoder(
-            weights.context[min(level, registered_model.LEVEL_SETS) - 1],
-            step,
-            level <= fields["grey"],
-            (shifts[0] - SHIFT_ORIGIN, shifts[1] - SHIFT_ORIGIN),
-        )
-        bands = grid.bands(cells, fields["cell"], level)
-        given = None if values is None else values.levels[level - 1]
-        if kernel.available():
-            parent = coder.level(context_native.Place(here, plain, parent, bands), given)
-        else:
-            parent = here.code(coder, plain, parent, bands, given)
-        yield parent
-        if level > 1:
-            plain = context.next_plain(plain, parent, grid.at(level - 1))
-
-
-def _code_lowest(
-    coder: context.Coder, fields: Mapping[str, Any], shape: tuple[int, int], values: Latents | None
-) -> Ints:
-    """Codes the lowest planes by ascending x + y, each value predicted from above and left."""
     h, w = shape
     scale = np.array(fields["lowest"], np.int64)
     count = len(scale)
     out = np.zeros((3, h, w), np.int32)
+    over = False
     for t in range(h + w - 1):
         i = np.arange(max(t - w + 1, 0), min(t, h - 1) + 1)
         j = t - i
@@ -135,7 +109,15 @@ def _code_lowest(
         given = np.zeros((count, len(i)), np.int64)
         if values is not None:
             given[:] = values.lowest[:count, i, j]
-        coded = coder.code(given.T.ravel(), mean.T.astype(np.int64).ravel(), np.tile(scale, len(i)))
+        expected = mean.T.astype(np.int64).ravel()
+        coded = (expected + 8) >> laplace.MEAN_BITS
+        if not over:
+            try:
+                coded = coder.code(given.T.ravel(), expected, np.tile(scale, len(i)))
+            except FormatError:
+                if not cut or t == 0:
+                    raise
+                over = True
         out[:count, i, j] = coded.reshape(-1, count).T
     return out
 
@@ -180,23 +162,32 @@ class Encoder:
             self._escapes.append(off[escape])
         return np.where(there, values, 0)
 
-    def level(self, at: context_native.Place, values: Ints | None) -> Ints:
-        """Writes a whole level with the compiled kernel; returns its latents as decoded."""
-        assert values is not None, "an encoder is given what to put"
+    def level(self, at: Place, values: Ints) -> Ints:
+        """Writes a level; returns its latents as decoded."""
+        if not kernel.available():
+            return at.coder.code(self, at.low, at.parent, at.bands, values)
         latents, escapes = context_native.encode(at, values, self.stream)
         self._escapes.append(escapes)
         return latents
 
+    def tile(self) -> bytes:
+        """Everything written, as a tile: the number of bytes of its escapes, they, its stream."""
+        escapes = self.escapes()
+        return _varying(len(escapes)) + escapes + self.stream.finish()
+
     def escapes(self) -> bytes:
         """Differences that have no symbol, zigzag-coded, 7 bits a byte, the low bits first."""
-        out = bytearray()
-        for value in np.concatenate(self._escapes).tolist() if self._escapes else ():
-            n = 2 * value if value >= 0 else -2 * value - 1
-            while n > 127:
-                out.append(n & 127 | 128)
-                n >>= 7
-            out.append(n)
-        return bytes(out)
+        values = np.concatenate(self._escapes).tolist() if self._escapes else ()
+        return b"".join(_varying(2 * v if v >= 0 else -2 * v - 1) for v in values)
+
+
+def _varying(number: int) -> bytes:
+    """Number >= 0 in as many bytes as it takes, 7 bits each, the low ones first."""
+    out = bytearray()
+    while number > 127:
+        out.append(number & 127 | 128)
+        number >>= 7
+    return bytes([*out, number])
 
 
 class Decoder:
@@ -253,14 +244,21 @@ class Decoder:
         out[there] = off
         return out
 
-    def level(self, at: context_native.Place, values: Ints | None) -> Ints:
-        """Reads a whole level with the compiled kernel; `values` is ignored.
+    def level(self, at: Place, out: Ints) -> None:
+        """Reads a level.
+
+        Args:
+            at: The level.
+            out: int32 [9, h, w] zeros that are replaced by the latents; by those that were read
+                before an error, too.
 
         Raises:
             FormatError: The stream is corrupt.
         """
-        latents, self._at = context_native.decode(at, self._stream, self._escapes, self._at)
-        return latents
+        if kernel.available():
+            self._at = context_native.decode(at, self._stream, self._escapes, self._at, out)
+        else:
+            at.coder.code(self, at.low, at.parent, at.bands, None, out)
 
     def _escape(self) -> int:
         """Reads a value that has no symbol."""

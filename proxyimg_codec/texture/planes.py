@@ -10,14 +10,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..container.plan import TILE_MIN
 from ..entropy import arrays, laplace
 from ..errors import FormatError
 from ..native import kernel
 from . import context, registered_model, synthesis
-from .context import Ints
-from .grid import Grid
-from .latents import SHIFT_ORIGIN, Decoder, Latents, decode, encode, steps
+from .context import SHIFT_ORIGIN, Ints
+from .decoding import Decoding
+from .grid import Grid, Window
+from .latents import Latents, encode
 from .network import Floats
+
+LARGE = 1 << 20
+"""Samples from which on a raster has tiles by default."""
+
+TILES, TILE_BYTES, TILES_SHARE = (7, 8, 9), 13, 0.005
+"""Binary logarithms of sides of tiles, about what a tile costs, and the share of all bytes that tiles
+may cost: the smallest tiles are taken that cost no more."""
+
+DETAIL_UNIT, DETAIL_MAX = 8, 255
+"""Unit of `details` in 1/8-bit levels, and their largest value."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +54,11 @@ class Planes:
     def components(self) -> int:
         """Components of a sample: 1 for grey, 3 for colour."""
         return int(self.packed["components"])
+
+    @property
+    def details(self) -> tuple[float, ...]:
+        """Root mean square, in 8-bit levels, that each level adds, from level 1; () if unknown."""
+        return tuple(v / DETAIL_UNIT for v in self.packed["details"])
 
     @cached_property
     def support(self) -> NDArray[np.bool_]:
@@ -77,26 +94,59 @@ class Planes:
         Raises:
             FormatError: The stream is corrupt.
         """
-        return decode(self.packed, self.support, self.where)
+        return Decoding(self.packed, self.support, self.where).latents()
 
     @kernel.Computed
-    def raster(self) -> Floats:
-        """Decoded raster, float32 [rows, columns, components] in 0..1.
+    def _decoding(self) -> Decoding:
+        return Decoding(self.packed, self.support, self.where)
+
+    def samples(self, window: Window) -> Floats:
+        """Decodes a part of the raster.
+
+        Args:
+            window: The samples that are needed.
+
+        Returns:
+            float32 [rows, columns, components] in 0..1: all samples, of which those in the window
+            are decoded.
 
         Raises:
             FormatError: The stream is corrupt.
             UnsupportedError: The model is unknown.
         """
-        found = self.latents
-        weights = registered_model.registered(self.packed["model"])
-        grid = Grid.of(self.packed)
-        out = synthesis.samples(weights, grid, found.levels, found.lowest, self.packed["step"])
+        return self._decoding.samples(0, window)
+
+    def reduced(self, level: int, window: Window) -> Floats:
+        """Decodes a part of the raster without its finest levels.
+
+        Args:
+            level: Number of the levels to leave out, 1..`levels`.
+            window: Rows and columns that are needed of a raster that is 2**level times smaller.
+
+        Returns:
+            float32 [rows, columns, components] in 0..1. Row i, counted from the top of the raster,
+            lies on row 2**level i of the samples.
+
+        Raises:
+            FormatError: The stream is corrupt.
+            UnsupportedError: The model is unknown.
+        """
+        return self._decoding.samples(level, window)
+
+    def shape(self, level: int) -> tuple[int, int]:
+        """Rows and columns of the raster without its `level` finest levels."""
+        return Grid.of(self.packed).at(level) if level else self.size[::-1]
+
+    @property
+    def raster(self) -> Floats:
+        """All samples, float32 [rows, columns, components] in 0..1.
+
+        Raises:
+            FormatError: The stream is corrupt.
+            UnsupportedError: The model is unknown.
+        """
         columns, rows = self.size
-        out = np.ascontiguousarray(out[:rows, :columns])
-        if self.components == 1:
-            out = np.mean(out, 2, keepdims=True, out=np.empty((rows, columns, 1), np.float32))
-        out /= 255
-        return np.clip(out, 0, 1, out=out)
+        return self.samples(Window.whole((rows, columns)))
 
 
 def unpack(fields: Mapping[str, Any], where: str = "chunk PLAN") -> Planes:
@@ -118,13 +168,17 @@ def unpack(fields: Mapping[str, Any], where: str = "chunk PLAN") -> Planes:
         raise FormatError("more levels without chroma than there are levels", where, rule="PYR-2")
     if len(fields["lowest"]) != components or len(fields["shifts"]) != 2 * levels:
         raise FormatError("scales or shifts do not fit the levels", where, rule="PYR-2")
+    tile, details = fields["tile"], fields["details"]
+    if 0 < tile < TILE_MIN or len(details) not in (0, levels):
+        raise FormatError("a tile is too small, or details do not fit the levels", where,
+                          rule="PYR-53")  # fmt: skip
     return Planes(fields, where)
 
 
 def encoded(
     latents: Latents, size: tuple[int, int], step: int, support: NDArray[np.bool_] | None = None,
     cell: int = 3, components: int = 3, number: int = 2,
-    shifts: tuple[int, ...] | None = None,
+    shifts: tuple[int, ...] | None = None, tile: int | None = None,
 ) -> Planes:  # fmt: skip
     """Encodes latents as planes.
 
@@ -138,6 +192,8 @@ def encoded(
         number: Number of the registered model.
         shifts: Shifts of the scale index: luma and chroma of level 1, then of level 2, and so on;
             by default 0.
+        tile: Binary logarithm of the side of a tile in positions, 0 = no tiles; by default large
+            rasters have tiles that cost little.
 
     Raises:
         ValueError: The magnitude of a latent is `context.LIMIT` or more.
@@ -155,6 +211,8 @@ def encoded(
     grey = levels if components == 1 else 0
     while grey < levels and not latents.levels[grey][3:].any():
         grey += 1
+    model = registered_model.registered(number)
+    details = synthesis.details(model, latents.levels, step, size)
     fields: dict[str, Any] = {
         "model": number,
         "size": list(size),
@@ -166,59 +224,64 @@ def encoded(
         "shifts": [SHIFT_ORIGIN + v for v in shifts or (0,) * (2 * levels)],
         "cell": cell,
         "support": coded_support,
+        "tile": tile or 0,
+        "details": [min(round(DETAIL_UNIT * v), DETAIL_MAX) for v in details],
     }
     data, escapes = encode(fields, support, latents)
+    if tile is None and (side := _tile_of(Grid.of(fields), len(data))):
+        fields["tile"] = side
+        data, escapes = encode(fields, support, latents)
     return Planes({**fields, "escapes": escapes, "data": data})
 
 
-def salvaged(planes: Planes) -> tuple[Planes, int]:
+def _tile_of(grid: Grid, size: int) -> int:
+    """Binary logarithm of the side of tiles for a stream of a size; 0 if it shall have none."""
+    levels = range(1, grid.levels + 1)
+    large = grid.size[0] * grid.size[1] >= LARGE
+    for side in TILES if large else ():
+        count = sum(len(grid.tiles(level, side)) for level in levels)
+        if count * TILE_BYTES <= TILES_SHARE * size:
+            return side
+    return 0
+
+
+def salvaged(planes: Planes, truncated: bool) -> tuple[Planes, int]:
     """Keeps the levels that can be decoded from a stream that is cut off or damaged.
 
-    A level in which the stream fails is dropped, with all finer ones. If the stream can be decoded
-    but does not end where it should, the finest level is dropped: wherever the damage is, the last
+    Of the level in which a stream ends that is cut off, what comes before is kept. If the stream is
+    damaged elsewhere, a level in which it fails is dropped, with all finer ones; if it can be
+    decoded but does not end where it should, the finest level is: wherever the damage is, the last
     symbols are wrong.
 
     Args:
         planes: Planes as they were read; `data` may be shorter than its header says.
+        truncated: Whether they are cut off, and not damaged elsewhere.
 
     Returns:
-        Planes with a sound stream, and the number of levels that were kept; the latents of finer
-        levels are 0. If nothing is wrong, the same planes and the number of all levels.
+        Planes with a sound stream, and the number of levels that are whole; the latents that are
+        missing are 0. If nothing is wrong, the same planes and the number of all levels.
 
     Raises:
         FormatError: Not even the lowest planes can be decoded.
     """
-    packed, support, where = planes.packed, planes.support, planes.where
-    found: list[Ints] = []
+    packed, support = planes.packed, planes.support
     try:
-        coder = Decoder(_cut(packed["data"]), packed["escapes"])
-        for latents in steps(coder, packed, support, None):
-            found.append(latents)
-        coder.finish(where)
+        found, count = Decoding(packed, support, planes.where, cut=True).salvaged()
     except FormatError as error:
-        if not found:
-            raise FormatError(
-                f"none of the planes can be decoded: {error}", where, rule=error.rule
-            ) from None
-    else:
-        return planes, packed["levels"]
-    del found[packed["levels"] :]
-    count, grid = len(found) - 1, Grid.of(packed)
-    found += [np.zeros((9, *grid.at(k)), np.int32) for k in range(grid.levels - count, 0, -1)]
+        raise FormatError(
+            f"none of the planes can be decoded: {error}", planes.where, rule=error.rule
+        ) from None
+    left = packed["levels"] - count
+    if not left:
+        return planes, count
+    if not truncated:
+        found = found._replace(levels=(*(y * 0 for y in found.levels[:left]), *found.levels[left:]))
     shifts = tuple(v - SHIFT_ORIGIN for v in packed["shifts"])
     sound = encoded(
-        Latents(tuple(found[:0:-1]), found[0]), planes.size, packed["step"], support,
-        packed["cell"], planes.components, packed["model"], shifts,
+        found, planes.size, packed["step"], support, packed["cell"], planes.components,
+        packed["model"], shifts, packed["tile"],
     )  # fmt: skip
-    return replace(sound, where=where), count
-
-
-def _cut(data: bytes) -> bytes:
-    """Lowers the number of words in the header of a stream to the number that is there."""
-    head = 5 + (4 << data[0] if data else 0)
-    there = max(len(data) - head, 0) // 2
-    words = min(int.from_bytes(data[head - 4 : head], "little"), there)
-    return data[: head - 4] + words.to_bytes(4, "little") + data[head:] if there else data
+    return replace(sound, where=planes.where), count
 
 
 def cells_of(size: tuple[int, int], cell: int) -> tuple[int, int]:

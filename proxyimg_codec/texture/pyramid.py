@@ -20,20 +20,16 @@ from ..container import texr
 from ..entropy import arrays
 from ..errors import FormatError
 from ..native import kernel
+from . import sampling
 from .completion import FILL_ONE, Copies, completed
 from .completion import unpack as unpacked_copies
 from .diffusion import Values, diffused
+from .grid import Window
 from .implicit import Box, ImplicitTexture
 from .network import Floats, Network
 from .occlusion import ALL_IN_PLACE, Moved, Occlusion, Samples
 from .planes import Planes
 from .unmix import rim
-
-TAPS = 4
-"""Number of samples, across and down, that a point is interpolated from."""
-
-CHUNK = 4096
-"""Points interpolated at a time, so that their samples stay in the processor cache."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,6 +219,8 @@ class PyramidTexture:
         box: Box,
         moved: Moved = ALL_IN_PLACE,
         native: bool = False,
+        window: Window | None = None,
+        seen: bool = False,
     ) -> Floats:
         """Interpolates the texture at points.
 
@@ -235,6 +233,10 @@ class PyramidTexture:
             box: Rectangle of the layer in canvas pixels.
             moved: Neighbours that have moved relative to the layer.
             native: Whether to use the compiled kernel.
+            window: Samples of the part that hold all points, and those that points of later calls
+                are interpolated from; by default all.
+            seen: Whether what hides samples hides these points, too: then all that are asked for
+                and lie on samples show.
 
         Returns:
             float32 [N, `channels`] premultiplied colour, and alpha if there is any, not clamped.
@@ -242,58 +244,63 @@ class PyramidTexture:
         Raises:
             FormatError: The planes are corrupt.
         """
-        column, fx = _position(x, box[0], box[2], self.part[2])
-        row, fy = _position(y, box[1], box[3], self.part[3])
+        column, fx = sampling.position(x, box[0], box[2], self.part[2])
+        row, fy = sampling.position(y, box[1], box[3], self.part[3])
         if not (fx.any() or fy.any()):
-            return self._samples(row, column, moved)
-        padded = self.padded(moved)
-        first = row * padded.shape[1] + column
-        if native:
-            return kernel.sample(padded, first.astype(np.int32), fx, fy)
-        out = np.empty((len(x), self.channels(())), np.float32)
-        for i in range(0, len(x), CHUNK):
-            at = slice(i, i + CHUNK)
-            out[at] = _interpolated(padded, first[at], fx[at], fy[at])
-        return out
+            return self._samples(row, column, moved, seen)
+        window = window or Window.whole((self.part[3], self.part[2]))
+        padded = self.padded(moved, window)
+        return sampling.interpolated(padded, row - window.top, column - window.left, fx, fy, native)
 
-    def padded(self, moved: Moved) -> Floats:
-        """All samples of the part, premultiplied and filled, with a border for interpolation.
+    def padded(self, moved: Moved, window: Window | None = None) -> Floats:
+        """Samples of the part, premultiplied and filled, with a border for interpolation.
 
         Args:
             moved: Neighbours that have moved relative to the layer.
+            window: The samples; by default all of the part.
 
         Returns:
-            float32 [height + 3, width + 3, `channels`]; the edge is repeated once before and twice
-            behind.
+            float32 [height + 3, width + 3, `channels`] of the window; one sample more before, and
+            two behind, where the edge of the part is repeated.
 
         Raises:
             FormatError: The planes are corrupt.
         """
-        found = self._last.get(moved)
+        _, _, width, height = self.part
+        window = window or Window.whole((height, width))
+        found = self._last.get((moved, window))
         if found is None:
-            _, _, width, height = self.part
             rows, columns = (
-                np.clip(np.arange(-1, n + 2), 0, n - 1).astype(np.intp) for n in (height, width)
-            )
+                np.clip(np.arange(start - 1, stop + 2), 0, n - 1).astype(np.intp)
+                for start, stop, n in (
+                    (window.top, window.bottom, height), (window.left, window.right, width),
+                )
+            )  # fmt: skip
             found = np.empty((len(rows), len(columns), self.channels(())), np.float32)
             for row, out in zip(rows, found, strict=True):
                 out[:] = self._samples(np.full_like(columns, row), columns, moved)
             # `moved` stays the same while a layer is dragged, so keeping the last one is enough.
             self._last.clear()
-            self._last[moved] = found
+            self._last[moved, window] = found
         return found
 
     @kernel.Computed
-    def _last(self) -> dict[Moved, Floats]:
+    def _last(self) -> dict[tuple[Moved, Window], Floats]:
         return {}
 
-    def _samples(self, row: NDArray[np.intp], column: NDArray[np.intp], moved: Moved) -> Floats:
+    def _samples(
+        self, row: NDArray[np.intp], column: NDArray[np.intp], moved: Moved, seen: bool = False
+    ) -> Floats:
         """Premultiplied samples [N, `channels`] at rows and columns [N], filled and unmixed."""
         x, y, width, _ = self.part
-        kept = self.kept(moved)
+        kept = None if seen else self.kept(moved)
+        window = Window(
+            int(row.min()) + y, int(row.max()) + y + 1,
+            int(column.min()) + x, int(column.max()) + x + 1,
+        )  # fmt: skip
         at = (row + y) * self.planes.size[0] + (column + x)
         colour, alpha = (
-            None if p is None else p.raster.reshape(-1, p.components).take(at, 0)
+            None if p is None else p.samples(window).reshape(-1, p.components).take(at, 0)
             for p in (self.planes, self.alpha)
         )  # fmt: skip
         assert colour is not None
@@ -320,45 +327,6 @@ def _samples(mask: NDArray[np.bool_], cell: int, part: Box) -> Samples:
     """Samples of a part, bool [height, width], that lie in the cells of a mask."""
     _, _, width, height = part
     return mask.repeat(1 << cell, 0)[:height].repeat(1 << cell, 1)[:, :width]
-
-
-def _interpolated(padded: Floats, first: NDArray[np.intp], fx: Floats, fy: Floats) -> Floats:
-    """Colours [n, C] at fractions fx, fy [n] of the 4x4 samples that begin with `first` [n]."""
-    samples = padded.reshape(-1, padded.shape[2])
-    across, down = _weights(fx), _weights(fy)
-    total = np.zeros((len(first), samples.shape[1]), np.float32)
-    for j in range(TAPS):
-        part = np.zeros_like(total)
-        for i in range(TAPS):
-            part += across[i][:, None] * samples.take(first + (j * padded.shape[1] + i), 0)
-        total += down[j][:, None] * part
-    return total
-
-
-def _position(
-    points: NDArray[np.float64], start: int, extent: int, samples: int
-) -> tuple[NDArray[np.intp], Floats]:
-    """Index of the sample before each point along one axis, and the fraction to the next sample."""
-    at = (points - start) * (samples / extent)
-    at -= 0.5
-    np.clip(at, 0, samples - 1, out=at)
-    before = at.astype(np.intp)
-    at -= before
-    return before, at.astype(np.float32)
-
-
-def _weights(f: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Weights of four neighbouring samples for points at the fractions f [N] after the second one.
-
-    They add up to 1. At f = 0 they are exactly 0, 1, 0, 0.
-    """
-    half = np.float32(0.5)
-    return (
-        ((2 - f) * f - 1) * f * half,
-        ((3 * f - 5) * f * f + 2) * half,
-        ((4 - 3 * f) * f + 1) * f * half,
-        (f - 1) * f * f * half,
-    )
 
 
 def unpack(

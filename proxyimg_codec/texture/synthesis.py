@@ -13,7 +13,7 @@ from ..native import kernel
 from . import synthesis_native
 from .context import Ints
 from .convolution import by_row, convolved, strips
-from .grid import BANDS, Grid, mirrored_indices
+from .grid import BANDS, mirrored_indices
 from .network import Floats
 from .registered_model import STEP_ORIGIN, Model, Synthesis
 
@@ -49,40 +49,93 @@ def _planes(colour: int) -> list[tuple[int, tuple[int, int]]]:
     return [(3 + 3 * band + colour, way) for band, way in enumerate(BANDS)]
 
 
-def samples(model: Model, grid: Grid, latents: Sequence[Ints], lowest: Ints, step: int) -> Floats:
-    """Computes the samples of a raster from its latents.
+def finer(
+    model: Model, level: int, low: Floats, latents: Ints, step: int, shape: tuple[int, int]
+) -> Floats:
+    """Computes the next finer planes, or a part of them.
+
+    A part lacks neighbours at its edges: what is at most 3 positions from one that is not an edge
+    of the planes is wrong.
 
     Args:
         model: The registered model.
-        grid: Sizes of the planes.
-        latents: int32 [9, h, w] latents of each level, from level 1, the finest, on.
-        lowest: int32 [3, h, w] lowest planes.
+        level: Number of the level, from 1, the finest.
+        low: float32 [h, w, 3] planes.
+        latents: int32 [9, h, w] latents of the level.
         step: Quantization step, as in PLAN.
+        shape: Rows and columns of the finer planes: 2 h or 2 h - 1, and so on.
 
     Returns:
-        float32 [H, W, 3] samples in 0..255, not clipped; with padding, if planes are padded.
+        float32 [*shape, 3] planes.
     """
-    out = np.ascontiguousarray(lowest.transpose(1, 2, 0), np.float32)
-    for number in range(len(latents), 0, -1):
-        weights = model.synthesis[min(number, len(model.synthesis)) - 1]
-        out = _finer(weights, out, latents[number - 1], step, grid.at(number - 1))
-    colours = model.to_colour.floats * np.float32(2 ** (step / 64))
-    for top, bottom in strips(*out.shape[:2]):
-        out[top:bottom] = out[top:bottom] @ colours.T + 128
-    return out
-
-
-def _finer(
-    weights: Synthesis, low: Floats, latents: Ints, step: int, shape: tuple[int, int]
-) -> Floats:
-    """Next finer planes float32 [*shape, 3] from planes [h, w, 3] and latents [9, h, w]."""
+    weights = model.synthesis[min(level, len(model.synthesis)) - 1]
     t = np.float32((step - STEP_ORIGIN) / 128)
     gain = np.exp(weights.gain.floats + weights.gain_by_step.floats * t)
     bias = weights.first_bias.floats + weights.first_by_step.floats * t
-    linear = (wavelet() + weights.delta.floats).astype(np.float32)
+    linear = _linear(model, level).astype(np.float32)
     if kernel.available():
         return synthesis_native.finer(weights, linear, gain, bias, low, latents, shape)
     return _filtered(weights, linear, gain, bias, low, latents, shape)
+
+
+def _linear(model: Model, level: int) -> NDArray[np.float64]:
+    """Weights of the linear part of a level, [12, 12, 5, 5]."""
+    weights = model.synthesis[min(level, len(model.synthesis)) - 1]
+    return wavelet() + weights.delta.floats
+
+
+def colours(model: Model, planes: Floats, step: int, level: int = 0) -> Floats:
+    """Computes the colours of planes.
+
+    Args:
+        model: The registered model.
+        planes: float32 [h, w, 3] planes above a level.
+        step: Quantization step, as in PLAN.
+        level: Number of the levels below, which are left out. Then colours are those that even
+            planes would have if these levels were made.
+
+    Returns:
+        float32 [h, w, 3] colours in 0..255, not clipped.
+    """
+    matrix = model.to_colour.floats
+    for left_out in range(1, level + 1):
+        matrix = (matrix @ _evenly(model, left_out)).astype(np.float32)
+    matrix = matrix * np.float32(2 ** (step / 64))
+    out = np.empty_like(planes)
+    for top, bottom in strips(*planes.shape[:2]):
+        out[top:bottom] = planes[top:bottom] @ matrix.T + 128
+    return out
+
+
+def _evenly(model: Model, level: int) -> NDArray[np.float64]:
+    """Factors [3, 3] that even planes take on by the linear part of a level."""
+    sums = _linear(model, level)[:, :3].sum((2, 3))
+    return np.asarray(sums.reshape(3, 4, 3).mean(1))
+
+
+def details(model: Model, latents: Sequence[Ints], step: int, size: tuple[int, int]) -> list[float]:
+    """Computes how much of a raster each level adds: what it lacks without its latents.
+
+    Wavelets are nearly orthogonal, so squares of latents add up to squares of samples.
+
+    Args:
+        model: The registered model.
+        latents: int32 [9, h, w] latents of each level, from level 1, the finest, on.
+        step: Quantization step, as in PLAN.
+        size: Columns and rows of the raster.
+
+    Returns:
+        For each level the root mean square of what it adds, in 8-bit levels.
+    """
+    weight = np.square(model.to_colour.floats * 2 ** (step / 64)).mean(0)  # of each colour
+    t, out = (step - STEP_ORIGIN) / 128, []
+    for level, found in enumerate(latents, 1):
+        weights = model.synthesis[min(level, len(model.synthesis)) - 1]
+        gain = np.exp(weights.gain.floats + weights.gain_by_step.floats * t)
+        power = np.square(found.astype(np.float64)).sum((1, 2)) * gain**2
+        total = float((power.reshape(3, 3).sum(1) * weight).sum())
+        out.append(float(np.sqrt(total / (size[0] * size[1]))))
+    return out
 
 
 def _filtered(

@@ -1,6 +1,7 @@
 """Files that are cut off or damaged, with `tolerant`: what arrived is shown, and never silently."""
 
 import logging
+from dataclasses import replace
 
 import msgpack
 import numpy as np
@@ -8,12 +9,14 @@ import pytest
 
 import proxyimg_codec as pxi
 from conformance.make.builders import Numbers
-from conformance.make.valid import pyramids, views
+from conformance.make.valid import behind, pyramids, views
+from conformance.make.valid.versions import planes_first
 from proxyimg_codec.cli.decode import DAMAGED
 from proxyimg_codec.container import plan
 from proxyimg_codec.container.chunks import MAPS_UNTIL, Chunk, read, write
 from proxyimg_codec.container.fields import unpack
 from proxyimg_codec.errors import FormatError, UnsupportedError
+from proxyimg_codec.model import Layers
 from proxyimg_codec.texture import planes
 from tests.support.images import changed
 
@@ -85,7 +88,7 @@ def used(image):
 def test_the_more_arrives_the_better(flat, caplog):
     whole = pxi.from_bytes(flat)
     lowest, end = stream(flat), place(flat)[1]
-    quality = {}
+    quality, arrived = {}, {}
     for stop in range(lowest, end, 23):
         cut = flat[:stop]
         with pytest.raises(FormatError, match="truncated"):
@@ -101,13 +104,58 @@ def test_the_more_arrives_the_better(flat, caplog):
         for level, (found, full) in enumerate(
             zip(latents(image).levels, latents(whole).levels, strict=True), 1
         ):
-            expected = full if level > LEVELS - count else 0 * full
-            np.testing.assert_array_equal(found, expected)
+            if level == LEVELS - count:
+                arrived.setdefault(level, []).append(np.count_nonzero(found))
+                assert ((found == full) | (found == 0)).all()
+            else:
+                expected = full if level > LEVELS - count else 0 * full
+                np.testing.assert_array_equal(found, expected)
         np.testing.assert_array_equal(latents(image).lowest, latents(whole).lowest)
         quality.setdefault(count, psnr(image, whole))
         assert count == max(quality)
     assert sorted(quality) == list(range(LEVELS)), "the cuts meet every level"
     assert list(quality.values()) == sorted(quality.values())
+    assert all(counts == sorted(counts) for counts in arrived.values())
+    assert arrived[1][-1] > arrived[1][0]
+
+
+@pytest.mark.parametrize("name", ["pyramid-tiles", "pyramid-tiles-deep"])
+def test_tiles_that_arrived_are_shown(name, caplog):
+    data = built(pyramids, name)
+    whole = pxi.from_bytes(data)
+    image = tolerated(data[: place(data)[1] - 30], caplog)
+    for found, full in zip(latents(image).levels, latents(whole).levels, strict=True):
+        assert ((found == full) | (found == 0)).all()
+    first, all_of_it = latents(image).levels[0], latents(whole).levels[0]
+    np.testing.assert_array_equal(first[:, :64, :64], all_of_it[:, :64, :64])
+    assert (first != all_of_it).any()
+
+
+def test_the_beginning_has_all_layers(layered, caplog):
+    whole = pxi.from_bytes(layered)
+    image = tolerated(layered[: stream(layered) + 90], caplog)
+    assert [v.name for v in image.layers] == [v.name for v in whole.layers]
+    poses = [v.picture.layers["disc"].pose.shift for v in (image, whole)]
+    assert poses[0] == poses[1] != (0, 0)
+
+
+def test_planes_that_did_not_arrive(caplog):
+    """Alpha and what lies behind are left out; layers without colour are hidden."""
+    data = built(behind, "behind-alpha")
+    plans = [c for c in read(data) if c.type == plan.TYPE]
+    for count, chunk in enumerate(plans[1:], 1):
+        image = tolerated(data[: chunk.offset], caplog)
+        assert len(image.picture.planes) == count
+        assert [v.name for v in image.layers] == [v.name for v in pxi.from_bytes(data).layers]
+    several = pxi.from_bytes(built(views, "pyramid-cuts"))
+    disc = several.layers["disc"]
+    own = replace(disc.texture, planes=replace(disc.texture.planes), cuts=None)
+    layers = [several.layers[0], changed(disc, texture=own)]
+    data = changed(several, layers=Layers(layers)).to_bytes()
+    last = [c for c in read(data) if c.type == plan.TYPE][-1]
+    image = tolerated(data[: last.offset + 20], caplog)
+    assert [v.pose.hidden for v in image.picture.layers] == [False, True]
+    assert "layer 'disc' is hidden: its planes are not there" in image.damage
 
 
 def test_after_the_planes_the_picture_is_whole(flat, caplog):
@@ -119,8 +167,9 @@ def test_after_the_planes_the_picture_is_whole(flat, caplog):
 
 
 def test_without_textures_there_are_no_layers(layered, caplog):
-    """The raster is the picture before its layers were moved."""
+    """As of version 0.11. The raster is the picture before its layers were moved."""
     whole = pxi.from_bytes(layered)
+    layered = write(planes_first(layered), (0, 11))
     raster = whole.layers[0].texture.planes.raster
     for stop in (place(layered)[1] + 4, len(layered) - 13):
         image = tolerated(layered[:stop], caplog)
@@ -174,9 +223,9 @@ def test_streams_that_do_not_end_with_the_latents(flat, caplog):
 
 
 def test_maps_of_earlier_versions(flat, caplog):
-    chunks = read(flat)
+    chunks = planes_first(flat)
     at = [c.type for c in chunks].index(plan.TYPE)
-    fields = unpack(plan.FIELDS, chunks[at].payload, "")
+    fields = unpack(plan.fields_of((0, 11)), chunks[at].payload, "")
     chunks[at] = Chunk(plan.TYPE, msgpack.packb(fields))
     data = write(chunks, MAPS_UNTIL)
     image = tolerated(data[: place(data)[1] - 9], caplog)
@@ -189,8 +238,8 @@ def test_what_cannot_be_done_without(flat, layered, small_pxi):
     for data, said in (
         (flat[:5], "signature"), (flat[:12], "HEAD"), (flat[:30], "HEAD"),
         (flat[: stream(flat)], "none of the planes"), (flat[: place(flat)[0] + 9], "too little"),
-        (glass[: place(glass)[1] + 4], "no raster"), (glass[:-30], "no raster"),
-        (small[:-300], "no raster"),
+        (flat[: place(flat)[0] - 8], "before the planes"),
+        (glass[: place(glass, "TEXR")[1]], "no raster"), (small[:-300], "no raster"),
         (bent(flat, "HEAD"), "chunk HEAD.*CRC"), (bent(layered, "LAYR"), "chunk LAYR.*CRC"),
         (bent(flat, "TEXR"), "chunk TEXR.*CRC"), (b"", "empty"),
     ):  # fmt: skip

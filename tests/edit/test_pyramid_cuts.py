@@ -19,7 +19,7 @@ from proxyimg_codec.render.view import make_view
 from proxyimg_codec.texture.occlusion import ALL_IN_PLACE, ALL_REMOVED, Moved, Occlusion
 from tests.support.edits import EDITS, covered, grown, near
 from tests.support.images import changed
-from tests.support.pyramids import SIZE, cut_picture, filled, implicit, planes, view
+from tests.support.pyramids import SIZE, cut_picture, filled, implicit, planes, showing, view
 
 
 @pytest.fixture
@@ -169,7 +169,7 @@ def test_a_white_object_on_black_leaves_and_takes_no_grey(made_up_planes):
     shape = Boundary(4, (ellipse((31, 23), (13, 11)),))
     image = stack([(0, 0, *SIZE), (16, 10, 30, 26)], [None, shape], [[1], [1]])
     share = share_of(image, "1")
-    image.layers[0].texture.planes.__dict__["raster"] = share[..., None].repeat(3, 2)
+    showing(image.layers[0].texture.planes, share[..., None].repeat(3, 2))
     disc = image.layers["1"]
 
     def grey(picture):
@@ -191,7 +191,7 @@ def test_a_white_object_on_black_is_white_where_it_stands_alone(made_up_planes):
     shape = Boundary(4, (ellipse((31, 23), (13, 11)),))
     image = stack([(0, 0, *SIZE), (16, 10, 30, 26)], [None, shape], [[1], [1]])
     share = share_of(image, "1")
-    image.layers[0].texture.planes.__dict__["raster"] = share[..., None].repeat(3, 2)
+    showing(image.layers[0].texture.planes, share[..., None].repeat(3, 2))
     for alone in (image.render(layers=["1"]), image.render(background=False)):
         np.testing.assert_allclose(alone[..., 3], 255 * share, atol=0.51)
         assert alone[alone[..., 3] > 0, :3].min() == 255

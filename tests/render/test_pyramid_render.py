@@ -11,7 +11,7 @@ from proxyimg_codec.model import Layers
 from proxyimg_codec.render import compose
 from proxyimg_codec.texture.planes import Planes
 from tests.support.images import changed
-from tests.support.pyramids import SIZE, filled, picture, planes, view
+from tests.support.pyramids import SIZE, filled, picture, planes, showing, view
 from tests.support.textures import ENGINES
 
 
@@ -73,7 +73,7 @@ def test_grey_planes_are_grey(made_up_planes):
 def test_alpha_is_straight_in_the_planes(made_up_planes):
     """What is clear multiplies the colour, and comes out again as straight alpha."""
     source, soft = planes("colour"), planes("soft", components=1)
-    soft.__dict__["raster"] = np.maximum(soft.raster, np.float32(0.1))
+    showing(soft, np.maximum(soft.raster, np.float32(0.1)))
     image = picture(source, soft)
     back = changed(image.layers[0], texture=view(source, soft))
     out = changed(image, layers=Layers([back]), info=None).render(dtype=np.float32)
@@ -89,7 +89,7 @@ def test_alpha_is_straight_in_the_planes(made_up_planes):
 
 def test_overshoot_of_the_kernel_is_clamped(pyramid):
     source = planes("colour")
-    source.__dict__["raster"] = np.zeros((48, 64, 3), np.float32)
+    showing(source, np.zeros((48, 64, 3), np.float32))
     source.raster[:, 32:] = 1
     back = changed(pyramid.layers["back"], texture=view(source))
     image = changed(pyramid, layers=Layers([back]), info=None)
@@ -118,10 +118,10 @@ def test_other_textures_in_the_same_place_are_not_mixed_up(pyramid):
 
 
 def test_corrupt_planes_are_found_when_they_are_drawn(pyramid, monkeypatch):
-    def corrupt(self):
+    def corrupt(self, window):
         raise FormatError("the stream is corrupt", "chunk PLAN 0")
 
-    monkeypatch.setattr(Planes, "raster", property(corrupt))
+    monkeypatch.setattr(Planes, "samples", corrupt)
     with pytest.raises(FormatError, match="PLAN 0: the stream"):
         picture(Planes(planes("colour").packed)).render()
 

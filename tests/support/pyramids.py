@@ -8,6 +8,7 @@ from conformance.make.builders import Numbers, ellipse, network, polygon, textur
 from proxyimg_codec.container import plan
 from proxyimg_codec.geometry.boundary import Boundary
 from proxyimg_codec.model import Layer, Layers
+from proxyimg_codec.texture import synthesis
 from proxyimg_codec.texture.occlusion import Occlusion
 from proxyimg_codec.texture.planes import Planes
 from proxyimg_codec.texture.pyramid import PyramidTexture
@@ -32,8 +33,13 @@ def raster(name, size, components):
 def unpacked(fields, where=""):
     """What `planes.unpack` does, but for the samples."""
     made = Planes(fields)
-    made.__dict__["raster"] = raster(fields["data"].decode(), made.size, made.components)
-    return made
+    return showing(made, raster(fields["data"].decode(), made.size, made.components))
+
+
+def showing(source, samples):
+    """Planes, whose samples are replaced."""
+    source.__dict__["samples"] = lambda window: samples
+    return source
 
 
 def planes(name, size=SIZE, components=3):
@@ -105,3 +111,12 @@ def implicit():
 def filled(view):
     """Whether a view has had to fill what does not show."""
     return any("filled" in key for key in vars(view))
+
+
+def synthesized(weights, grid, latents, step):
+    """Samples in 0..255 of whole planes, level by level; not clipped, with padding."""
+    out = np.ascontiguousarray(latents.lowest.transpose(1, 2, 0), np.float32)
+    for level in range(len(latents.levels), 0, -1):
+        found = latents.levels[level - 1]
+        out = synthesis.finer(weights, level, out, found, step, grid.at(level - 1))
+    return synthesis.colours(weights, out, step)

@@ -8,10 +8,11 @@ from hypothesis import strategies as st
 from proxyimg_codec.entropy import laplace
 from proxyimg_codec.errors import FormatError
 from proxyimg_codec.native import kernel
-from proxyimg_codec.texture import context, planes, registered_model, synthesis
+from proxyimg_codec.texture import context, planes, registered_model
 from proxyimg_codec.texture.grid import Grid, by_channel, mirrored_indices
 from proxyimg_codec.texture.latents import Encoder, Latents
 from proxyimg_codec.texture.planes import Planes
+from tests.support.pyramids import synthesized
 
 needs_kernel = pytest.mark.skipif(not kernel.available(), reason="the kernel was not compiled")
 ENGINES = ["numpy", pytest.param("kernel", marks=needs_kernel)]
@@ -283,7 +284,7 @@ def test_rasters(size, components, model):
     assert got.flags.c_contiguous
     found = coded.latents
     weights = registered_model.registered(model)
-    whole = synthesis.samples(weights, grid, found.levels, found.lowest, 293)
+    whole = synthesized(weights, grid, found, 293)
     part = whole[: size[1], : size[0]]
     expected = part if components == 3 else part.mean(2, keepdims=True)
     np.testing.assert_allclose(got, np.clip(expected / 255, 0, 1), atol=1e-6)
@@ -299,7 +300,7 @@ def test_engines_synthesize_alike(case):
     found = {}
     for name in ("numpy", "kernel"):
         with engine(name):
-            found[name] = synthesis.samples(weights, grid, latents.levels, latents.lowest, step)
+            found[name] = synthesized(weights, grid, latents, step)
     scale = max(np.abs(found["numpy"]).max(), 255)
     np.testing.assert_allclose(found["kernel"], found["numpy"], atol=1e-5 * scale)
 

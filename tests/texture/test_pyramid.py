@@ -3,10 +3,10 @@ import pytest
 
 from proxyimg_codec.entropy import arrays
 from proxyimg_codec.errors import FormatError
-from proxyimg_codec.texture import pyramid
+from proxyimg_codec.texture import sampling
 from proxyimg_codec.texture.diffusion import diffused
 from proxyimg_codec.texture.pyramid import FILL_ONE, PyramidTexture, unpack
-from tests.support.pyramids import filled, planes, raster, view
+from tests.support.pyramids import filled, planes, raster, showing, view
 
 PART = 7, 4, 21, 18
 """Of planes of 40x30."""
@@ -88,7 +88,7 @@ def test_chunks_do_not_show(source, monkeypatch):
     texture = view(source, part=PART)
     x, y = centres(PART)
     whole = texture.sample(x + 0.2, y - 0.4, PART)
-    monkeypatch.setattr(pyramid, "CHUNK", 37)
+    monkeypatch.setattr(sampling, "CHUNK", 37)
     np.testing.assert_array_equal(texture.sample(x + 0.2, y - 0.4, PART), whole)
 
 
@@ -137,7 +137,7 @@ def test_outside_the_mask_is_filled(source, alpha):
     changed[4:22, 7:28][~known] = 0.123
     changed[:4] = changed[22:] = 0.9
     other = planes("a", (40, 30))
-    other.__dict__["raster"] = changed
+    showing(other, changed)
     rng = np.random.default_rng(1)
     x, y = rng.uniform(7, 28, 500), rng.uniform(4, 22, 500)
     np.testing.assert_array_equal(

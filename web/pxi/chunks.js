@@ -45,7 +45,8 @@ const TABLES = {
   PLAN: {
     model: int(0, 2 ** 16 - 1), size: ints(1, 2 ** 24, 2), components: int(1, 3),
     step: int(0, 640), levels: int(1, 8), grey: int(0, 8), lowest: ints(0, 63),
-    shifts: ints(0, 15), cell: int(1, 8), support: bytes, escapes: bytes, data: bytes,
+    shifts: ints(0, 15), cell: int(1, 8), support: bytes, tile: int(0, 12), details: ints(0, 255),
+    escapes: bytes, data: bytes,
   },
   mOTN: {
     duration: int(1, 3600000), fps: int(1, 240), loop: int(0, 1), intervals: int(1, 2 ** 16),
@@ -95,7 +96,8 @@ function unpack({ kind, payload, minor }) {
   const values = new Values(payload);
   const { map, count } = values.header();
   need(!map || minor <= 3, `${kind} is a map`);
-  const absent = table === TEXTURES[2] && minor < 11 ? ABSENT : {};
+  let absent = table === TEXTURES[2] && minor < 11 ? ABSENT : {};
+  if (kind === "PLAN" && minor < 12) absent = { tile: 0, details: [] };
   const keys = Object.keys(table).filter((key) => !(key in absent));
   need(count === keys.length, `${kind} has ${count} values instead of ${keys.length}`);
   const content = { ...absent };
@@ -180,7 +182,7 @@ function checkPoses({ poses, meshes }) {
   }
 }
 
-/** PYR-1 to PYR-3, and the limits of SEC-2. */
+/** PYR-1 to PYR-3, PYR-53 and PYR-54, and the limits of SEC-2. */
 function checkPlans({ plans, textures }, limits) {
   for (const plan of plans) {
     supported(plan.model in MODEL_FILES, `model ${plan.model}`);
@@ -189,6 +191,8 @@ function checkPlans({ plans, textures }, limits) {
     need(plan.components === 3 || plan.grey === plan.levels, "grey planes with chroma");
     need(plan.lowest.length === plan.components, "the number of lowest scales is wrong");
     need(plan.shifts.length === 2 * plan.levels, "the number of shifts is wrong");
+    need(!plan.tile || plan.tile >= 6, "a tile is too small");
+    need([0, plan.levels].includes(plan.details.length), "the number of details is wrong");
     const [columns, rows] = plan.size.map((n) => Math.ceil(n / 2 ** plan.levels) * 2 ** plan.levels);
     limits.spend("samples", columns * rows);
     limits.spend("wavefronts", columns + 3 * rows);

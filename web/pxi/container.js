@@ -3,7 +3,8 @@
 import { need, supported, within } from "./errors.js";
 
 const SIGNATURE = [0x89, 0x50, 0x58, 0x49, 0x0d, 0x0a, 0x1a, 0x0a];
-const CRITICAL = ["HEAD", "LAYR", "MESH", "POSE", "NETW", "PLAN", "TEXR"];
+const CRITICAL = ["HEAD", "LAYR", "MESH", "POSE", "NETW", "TEXR", "PLAN"];
+const EARLIER = ["HEAD", "LAYR", "MESH", "POSE", "NETW", "PLAN", "TEXR"]; // before 0.12
 const ANCILLARY = ["iCCp", "eXIf", "xMPd", "cICp", "iNFO", "tREE", "mOTN", "uNDO"];
 
 const CRC = Uint32Array.from({ length: 256 }, (_, n) => {
@@ -42,25 +43,25 @@ export function readChunks(data, limits) {
     if (kind === "TAIL") break;
   }
   need(at === data.length, "the file goes on after TAIL");
-  checkOrder(chunks);
+  checkOrder(chunks, data[9] < 12 ? EARLIER : CRITICAL);
   return chunks;
 }
 
 /** CON-9 and CON-11 to CON-13. */
-function checkOrder(chunks) {
+function checkOrder(chunks, order) {
   need(chunks.length > 1 && chunks[0].kind === "HEAD", "the first chunk is not HEAD");
   const tail = chunks[chunks.length - 1];
   need(tail.kind === "TAIL" && tail.payload.length === 0, "the last chunk is not an empty TAIL");
   const seen = new Set();
   let rank = 0;
   for (const { kind } of chunks.slice(0, -1)) {
-    const critical = CRITICAL.indexOf(kind);
+    const critical = order.indexOf(kind);
     const ancillary = ANCILLARY.includes(kind);
     if (critical < 0 && !ancillary) {
       supported(kind[0] >= "a", `critical chunk ${kind}`);
       continue;
     }
-    const next = ancillary ? CRITICAL.length : critical;
+    const next = ancillary ? order.length : critical;
     need(next >= rank, `${kind} stands too late`);
     need(!seen.has(kind) || (critical > 0), `there is a second ${kind}`);
     seen.add(kind);

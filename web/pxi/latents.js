@@ -332,19 +332,21 @@ class Level {
     return out;
   }
 
-  /** Decodes the latents. */
-  decode(coder, ahead, shifts, grey) {
-    const { rows, columns, bands, width } = this;
-    const most = Math.min(rows, Math.ceil(columns / 3));
+  /** Decodes the latents of a tile {top, bottom, left, right}, which may be the whole level. */
+  decode(coder, ahead, shifts, grey, tile) {
+    const { columns, bands, width } = this;
+    const { top, bottom, left, right } = tile;
+    this.tile = tile;
+    const most = Math.min(bottom - top, Math.ceil((right - left) / 3));
     const hidden = new Int32Array(most * width);
     const places = new Uint32Array(most);
     const means = new Int32Array(6 * most);
     const scales = new Uint8Array(6 * most);
     const found = new Int32Array(6 * most);
-    for (let t = 0; t < columns + 3 * rows - 3; t++) {
+    for (let t = left + 3 * top; t < right + 3 * bottom - 3; t++) {
       let count = 0;
-      const last = Math.min(rows - 1, Math.floor(t / 3));
-      for (let y = Math.max(0, Math.ceil((t - columns + 1) / 3)); y <= last; y++) {
+      const last = Math.min(bottom - 1, Math.floor((t - left) / 3));
+      for (let y = Math.max(top, Math.ceil((t - right + 1) / 3)); y <= last; y++) {
         const at = y * columns + t - 3 * y;
         if (bands[at]) places[count++] = at;
       }
@@ -365,6 +367,15 @@ class Level {
     }
   }
 
+  /** Whether any position of a tile has latents. */
+  anyOf({ top, bottom, left, right }) {
+    for (let y = top; y < bottom; y++) {
+      const from = y * this.columns;
+      if (this.bands.subarray(from + left, from + right).some((b) => b)) return true;
+    }
+    return false;
+  }
+
   #store(places, count, found, first, channels) {
     for (let i = 0, k = 0; i < count; i++) {
       for (let c = 0; c < channels; c++, k++) {
@@ -378,13 +389,14 @@ class Level {
   /** Hidden values of a position into out[to ..] (PYR-23, PYR-24). */
   #hidden(at, ahead, out, to) {
     const { width, columns, latents, some, sums, total } = this;
+    const { top, left, right } = this.tile;
     sums.fill(0);
     const y = Math.floor(at / columns);
     const x = at - y * columns;
     for (let p = 0; p < 12; p++) {
       const near = x + BEFORE_X[p];
       const place = at + BEFORE_Y[p] * columns + BEFORE_X[p];
-      if (y + BEFORE_Y[p] < 0 || near < 0 || near >= columns || !some[place]) continue;
+      if (y + BEFORE_Y[p] < top || near < left || near >= right || !some[place]) continue;
       for (let c = 0; c < 9; c++) {
         const value = latents[c][place];
         if (value) this.#addCausal((p * 9 + c) * 2 * width, squash(value), logOf(value));
@@ -442,6 +454,35 @@ const BEFORE = [-2, -1, 0].flatMap((j) => [-2, -1, 0, 1, 2].map((i) => [j, i])).
 const BEFORE_Y = Int32Array.from(BEFORE, ([j]) => j);
 const BEFORE_X = Int32Array.from(BEFORE, ([, i]) => i);
 
+/** Tiles of a level (PYR-53); one, if it has none. */
+function tilesOf({ tile }, rows, columns) {
+  const side = tile ? 2 ** tile : Math.max(rows, columns);
+  const tiles = [];
+  for (let top = 0; top < rows; top += side) {
+    for (let left = 0; left < columns; left += side) {
+      tiles.push({
+        top, bottom: Math.min(top + side, rows), left, right: Math.min(left + side, columns) });
+    }
+  }
+  return tiles;
+}
+
+/** The coder of the first tile in some bytes, and the bytes behind it (PYR-53). */
+function tileCoder(bytes, most) {
+  let count = 0;
+  let at = 0;
+  for (let scale = 1; ; scale *= 128) {
+    need(at < bytes.length && at < 5, "a tile ends early");
+    count += (bytes[at] & 127) * scale;
+    if (bytes[at++] < 128) break;
+  }
+  const start = at + count;
+  need(start <= bytes.length, "the escapes of a tile end early");
+  const end = start + new Rans(bytes.subarray(start)).end;
+  const own = { data: bytes.subarray(start, end), escapes: bytes.subarray(at, start) };
+  return [new Coder(own, most), bytes.subarray(end)];
+}
+
 /** Latents of a PLAN: `lowest` [3][positions], and `levels` 1, 2, .. {rows, columns, latents}. */
 export function decodeLatents(plan, model) {
   const [w, h] = plan.size;
@@ -449,7 +490,10 @@ export function decodeLatents(plan, model) {
   const cells = plan.support.length
     ? decodeMask(plan.support, Math.ceil(h / 2 ** plan.cell), Math.ceil(w / 2 ** plan.cell))
     : null;
-  const coder = new Coder(plan, 6 * Math.min(...shapeOf(plan, 0)) + 6);
+  const most = 6 * Math.min(...shapeOf(plan, 0)) + 6;
+  const first = plan.tile ? new Rans(plan.data).end : plan.data.length;
+  const coder = new Coder({ data: plan.data.subarray(0, first), escapes: plan.escapes }, most);
+  let rest = plan.data.subarray(first);
   const lowest = decodeLowest(coder, plan.lowest, ...shapeOf(plan, count));
   let plain = lowest.map((plane) => plane.map((v) => 16 * v));
   let parent = null;
@@ -458,7 +502,15 @@ export function decodeLatents(plan, model) {
     const [rows, columns] = shapeOf(plan, l);
     const level = new Level(model.of(l).context, plan, [rows, columns], bandsOf(plan, cells, l));
     const shifts = plan.shifts.slice(2 * l - 2, 2 * l).map((v) => v - SHIFT_ORIGIN);
-    level.decode(coder, level.ahead(plain, parent), shifts, l <= plan.grey);
+    const ahead = level.ahead(plain, parent);
+    const tiles = tilesOf(plan, rows, columns);
+    for (const tile of tiles) {
+      if (tiles.length > 1 && !level.anyOf(tile)) continue;
+      let own = coder;
+      if (tiles.length > 1) [own, rest] = tileCoder(rest, most);
+      level.decode(own, ahead, shifts, l <= plan.grey, tile);
+      if (tiles.length > 1) own.finish();
+    }
     const { latents } = level;
     levels.unshift({ rows, columns, latents });
     if (l > 1) {
@@ -468,5 +520,6 @@ export function decodeLatents(plan, model) {
     parent = latents;
   }
   coder.finish();
+  need(rest.length === 0, "there are bytes after the last tile");
   return { lowest, levels };
 }

@@ -9,7 +9,8 @@ from typing import Any
 import msgpack
 import numpy as np
 
-from proxyimg_codec.container.chunks import write
+from proxyimg_codec.container import plan
+from proxyimg_codec.container.chunks import Chunk, write
 from proxyimg_codec.entropy import arrays
 from proxyimg_codec.model import Picture
 
@@ -20,7 +21,7 @@ from .base import Base, Row, refused
 from .bombs import stream
 from .pyramids import Views, different
 
-HEAD, BACK, DISC, _, _, OWN, SOFT, BACK_TEXR, DISC_TEXR, TAIL = range(10)
+HEAD, BACK, DISC, BACK_TEXR, DISC_TEXR, _, _, OWN, SOFT, TAIL = range(10)
 """Positions of the chunks in the base file."""
 
 PART = 4, 3, 16, 12
@@ -70,9 +71,21 @@ def _versions(version: tuple[int, int], count: int) -> Callable[[Base], bytes]:
         for at in (BACK_TEXR, DISC_TEXR):
             kept = list(values(different(b, at, behind=0, behind_alpha=0)).values())
             chunks[at] = replace(chunks[at], payload=msgpack.packb(kept[:count]))
-        return write(chunks[:OWN] + chunks[BACK_TEXR:], version)
+        plans = [c for c in chunks[:OWN] if c.type == plan.TYPE]
+        if version < plan.TILED_FROM:
+            textures = chunks[BACK_TEXR : DISC_TEXR + 1]
+            return write(
+                [*chunks[:BACK_TEXR], *map(short, plans), *textures, chunks[TAIL]], version
+            )
+        return write([*chunks[:OWN], chunks[TAIL]], version)
 
     return build
+
+
+def short(chunk: Chunk) -> Chunk:
+    """PLAN as it was before 0.12."""
+    *values, _, _, escapes, stream = msgpack.unpackb(chunk.payload)
+    return replace(chunk, payload=msgpack.packb([*values, escapes, stream]))
 
 
 def _many(b: Base) -> bytes:
@@ -85,8 +98,8 @@ def _many(b: Base) -> bytes:
     return write([
         different(b, 0, layers=5, opaque=0),
         *(different(b, 2, name=name) for name in "abcde"),
-        different(b, 3, size=[side, side], support=b""),
-        *[different(b, 5, **texture)] * 5,
+        *[different(b, 4, **texture)] * 5,
+        different(b, 5, size=[side, side], support=b""),
         b.chunks[6],
     ])  # fmt: skip
 
@@ -96,9 +109,9 @@ def _large(size: list[int]) -> Callable[[Base], bytes]:
 
     def build(b: Base) -> bytes:
         chunks = list(b.chunks)
-        chunks[3] = different(b, 3, size=size, support=b"")
+        chunks[5] = different(b, 5, size=size, support=b"")
         texture = {"part": [0, 0, *size], "cell": 6, "offsets": [1, 1]}
-        chunks[5] = different(b, 5, **texture, sources=stream())
+        chunks[4] = different(b, 4, **texture, sources=stream())
         return write(chunks)
 
     return build

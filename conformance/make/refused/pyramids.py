@@ -10,18 +10,19 @@ import numpy as np
 from proxyimg_codec.container.chunks import Chunk, write
 from proxyimg_codec.entropy import arrays
 from proxyimg_codec.model import Picture
-from proxyimg_codec.texture import planes
+from proxyimg_codec.texture import decoding, planes
 from proxyimg_codec.texture.latents import Latents
 
 from ..builders import SIZE, Numbers, changed, ellipse, layer, picture
 from ..valid.pyramids import coded, view
 from .base import Base, Row, put, refused, words
 
-HEAD, BACK, DISC, PLAN, BACK_TEXR, DISC_TEXR, TAIL = range(7)
+HEAD, BACK, DISC, BACK_TEXR, DISC_TEXR, PLAN, TAIL = range(7)
 """Positions of the chunks in the base file."""
 
-COLOUR, ALPHA = 3, 4
-CLEAR_TEXR = (5, 6)
+CLEAR_TEXR = (3, 4)
+COLOUR, ALPHA = 5, 6
+TILED_PLAN = 3
 """Positions of planes and textures in the base file with alpha."""
 
 
@@ -60,6 +61,21 @@ class Clear(Base):
         )
 
 
+class Tiled(Base):
+    """Valid file of one layer whose finest level has two tiles."""
+
+    def build(self, n: Numbers) -> Picture:
+        """Makes the picture of the file."""
+        source = coded(n, (138, 6), levels=1, tile=6)
+        return picture((138, 6), [layer("back", (0, 0, 138, 6), view(source))])
+
+
+def _last(data: bytes) -> int:
+    """Bytes of the last of the tiles of `Tiled`."""
+    _, last = decoding.split(data, decoding.length(data, 0, False), False)
+    return 1 + sum(map(len, last))
+
+
 class Last(Base):
     """Valid file in which only the last latent escapes."""
 
@@ -85,7 +101,7 @@ def full(rows: int, columns: int, value: int) -> bytes:
 
 def _data(change: Callable[[bytes], bytes]) -> Callable[[Base], bytes]:
     """Builder of a file with a changed stream of the planes."""
-    return lambda b: b.edit(PLAN, "data", change)
+    return lambda b: b.edit(TILED_PLAN if isinstance(b, Tiled) else PLAN, "data", change)
 
 
 def _words(change: Callable[[bytes], bytes]) -> Callable[[Base], bytes]:
@@ -99,7 +115,7 @@ def _escapes(change: Callable[[bytes], bytes]) -> Callable[[Base], bytes]:
 
 
 def _unused(b: Base) -> bytes:
-    return b.order(HEAD, BACK, DISC, PLAN, PLAN, BACK_TEXR, DISC_TEXR, TAIL)
+    return b.order(HEAD, BACK, DISC, BACK_TEXR, DISC_TEXR, PLAN, PLAN, TAIL)
 
 
 def different(b: Base, at: int, **values: Any) -> Chunk:
@@ -111,15 +127,15 @@ def _between(b: Base) -> bytes:
     """File with planes between others that no texture names."""
     back, disc = CLEAR_TEXR
     return write([
-        *b.chunks[:ALPHA], b.chunks[COLOUR], b.chunks[ALPHA],
-        different(b, back, alpha=3), b.chunks[disc], b.chunks[-1],
+        *b.chunks[:back], different(b, back, alpha=3), b.chunks[disc],
+        b.chunks[COLOUR], b.chunks[COLOUR], b.chunks[ALPHA], b.chunks[-1],
     ])  # fmt: skip
 
 
 # fmt: off
 _PLANES: list[Row] = [
-    ("invalid-plan-order", "planes after the textures", "",
-     lambda b: b.order(HEAD, BACK, DISC, BACK_TEXR, DISC_TEXR, PLAN, TAIL)),
+    ("invalid-plan-order", "planes before the textures", "",
+     lambda b: b.order(HEAD, BACK, DISC, PLAN, BACK_TEXR, DISC_TEXR, TAIL)),
     ("invalid-plan-early", "planes before the layers", "",
      lambda b: b.order(HEAD, PLAN, BACK, DISC, BACK_TEXR, DISC_TEXR, TAIL)),
     ("invalid-plan-missing", "textures of planes that do not exist", "",
@@ -141,6 +157,9 @@ _PLANES: list[Row] = [
     ("invalid-plan-scale", "a scale of 64", "", lambda b: b.set(PLAN, lowest=[64, 30, 30])),
     ("invalid-plan-shift", "a shift of 8", "", lambda b: b.set(PLAN, shifts=[8, 8, 8, 16])),
     ("invalid-plan-cell", "cells of one sample", "", lambda b: b.set(PLAN, cell=0)),
+    ("invalid-plan-tile", "tiles of 2^5 positions", "", lambda b: b.set(PLAN, tile=5)),
+    ("invalid-plan-details", "what one of two levels adds", "",
+     lambda b: b.set(PLAN, details=[3])),
     ("unsupported-model", "a model of the future", "NUM-2", lambda b: b.set(PLAN, model=77)),
     ("unsupported-model-0", "model 0", "NUM-2", lambda b: b.set(PLAN, model=0)),
     ("invalid-support-full", "a support that is everywhere", "",
@@ -198,6 +217,20 @@ _STREAMS: list[Row] = [
      _escapes(lambda v: b"\xff\xff\xff\x3f" * len(v))),
 ]
 
+_TILES: list[Row] = [
+    ("invalid-tile-missing", "a tile too few", "", _data(lambda v: v[:-_last(v)])),
+    ("invalid-tile-more", "a tile too many", "", _data(lambda v: v + v[-_last(v):])),
+    ("invalid-tile-cut", "the last tile ends in its words", "PYR-53", _data(lambda v: v[:-2])),
+    ("invalid-tile-end", "a byte after the last tile", "PYR-53", _data(lambda v: v + b"\0")),
+    ("invalid-tile-open", "a number of escapes without an end", "",
+     _data(lambda v: v + b"\xff" * 5)),
+    ("invalid-tile-escapes", "a tile with an escape that it does not have", "",
+     _data(lambda v: v[:-_last(v)] + b"\1\0" + v[1 - _last(v):])),
+    ("invalid-tile-word", "a bit of the last word of a tile flipped", "PYR-53",
+     _data(lambda v: put(v, -1, lambda x: x ^ 1))),
+    ("invalid-tile-none", "one stream where there have to be tiles", "",
+     lambda b: b.set(TILED_PLAN, tile=0)),
+]
 
 _ORDER: list[Row] = [
     ("invalid-plan-use", "planes between others that no texture names", "", _between),
@@ -205,13 +238,14 @@ _ORDER: list[Row] = [
 
 _LAST: list[Row] = [
     ("invalid-latent-high", "a latent above 2^16, after which nothing comes", "",
-     lambda b: b.set(2, escapes=b"\xc0\x80\x08")),
+     lambda b: b.set(3, escapes=b"\xc0\x80\x08")),
 ]
 # fmt: on
 # fmt: on
 
 CASES = {
     **refused((*_PLANES, *_STREAMS), Views),
+    **refused(_TILES, Tiled),
     **refused(_ORDER, Clear),
     **refused(_LAST, Last),
 }

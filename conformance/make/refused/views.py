@@ -45,8 +45,8 @@ def _many(b: Base) -> bytes:
     return write([
         different(b, HEAD, layers=9, opaque=0),
         *(different(b, DISC, name=name) for name in "abcdefghi"),
-        different(b, PLAN, size=[side, side], support=b""),
         *[different(b, DISC_TEXR, **texture)] * 9,
+        different(b, PLAN, size=[side, side], support=b""),
         b.chunks[TAIL],
     ])  # fmt: skip
 
@@ -60,9 +60,9 @@ def _carved(b: Base) -> bytes:
         different(b, HEAD, layers=130),
         different(b, BACK, box=box),
         *(different(b, DISC, name=str(k)) for k in others),
-        different(b, PLAN, size=[side, side], support=b""),
         different(b, BACK_TEXR, **part),
         *[shared for _ in others],
+        different(b, PLAN, size=[side, side], support=b""),
         b.chunks[TAIL],
     ])  # fmt: skip
 
@@ -76,10 +76,10 @@ def _carving(b: Base) -> bytes:
         different(b, HEAD, layers=count),
         b.chunks[BACK],
         *(different(b, DISC, name=str(k), box=[0, 0, side, side]) for k in range(1, count)),
-        different(b, PLAN, size=[side, side], support=b""),
         b.chunks[BACK_TEXR],
         *[shared] * (count - 2),
         different(b, DISC_TEXR, **own),
+        different(b, PLAN, size=[side, side], support=b""),
         b.chunks[TAIL],
     ])  # fmt: skip
 

@@ -53,6 +53,7 @@ def coded(
     grey: int = 0,
     large: Sequence[int] = (),
     model: int = 2,
+    tile: int = 0,
 ) -> Planes:
     """Planes of random latents.
 
@@ -69,6 +70,7 @@ def coded(
         grey: Number of the finest levels without chroma.
         large: Latents in the middle of level 1, from the left, channel by channel.
         model: Number of the registered model.
+        tile: Binary logarithm of the side of a tile in positions; 0 = no tiles.
     """
     grid = Grid(size, levels, registered_model.registration(model).padded)
     most = max(round(60 * 2 ** (levels - step / 64)), 1)
@@ -86,7 +88,7 @@ def coded(
                 values[k % 9, shape[1] // 2, k] = value
         found.append(values.astype(np.int32))
     latents = Latents(tuple(found), lowest.astype(np.int32))
-    return planes.encoded(latents, size, step, cells, cell, components, model, shifts)
+    return planes.encoded(latents, size, step, cells, cell, components, model, shifts, tile)
 
 
 def view(
@@ -261,6 +263,50 @@ def _pyramid_escapes_long(n: Numbers) -> bytes:
     )
     chunks[at] = Chunk(plan.TYPE, pack(plan.FIELDS, {**fields, "escapes": long}))
     return write(chunks)
+
+
+@_case("A level with two tiles, above one without", "pyramid: tiles",
+       renders=[WHOLE, {"region": [100, 1, 20, 4]}])  # fmt: skip
+def _pyramid_tiles(n: Numbers) -> Picture:
+    return one(view(coded(n, (133, 7), tile=6, large=(70, -900))))
+
+
+@_case("Two levels with tiles, one below the other, and tiles of a few positions",
+       "pyramid: tiles", "pyramid: grey levels")  # fmt: skip
+def _pyramid_tiles_deep(n: Numbers) -> Picture:
+    return one(view(coded(n, (7, 261), tile=6, grey=1)))
+
+
+@_case("Tiles without latents: outside of the support, or in a corner without bands",
+       "pyramid: tiles", "pyramid: support")  # fmt: skip
+def _pyramid_tiles_support(n: Numbers) -> Picture:
+    cells = np.zeros(planes.cells_of((129, 129), 3), bool)
+    cells[16, 16] = cells[7, 15] = cells[1, 8] = True
+    return one(view(coded(n, (129, 129), levels=1, cells=cells, tile=6)))
+
+
+@_case("A grey raster with padded planes and tiles", "pyramid: tiles", "pyramid: components")
+def _pyramid_tiles_padded(n: Numbers) -> Picture:
+    return one(view(coded(n, (130, 9), components=1, model=1, tile=6)))
+
+
+@_case("Thumbnails that need all levels, and without a word of what they add",
+       "render: thumbnails", renders=[{"width": 16}, {"width": 9}])  # fmt: skip
+def _pyramid_thumbnail(n: Numbers) -> Picture:
+    source = coded(n, (48, 36), reach=9)
+    return one(view(Planes({**source.packed, "details": []})))
+
+
+@_case("Thumbnails that do without the finest level, or both", "render: thumbnails",
+       renders=[{"width": 20}, {"width": 7}, {"region": [7, 5, 42, 36], "width": 13}])  # fmt: skip
+def _pyramid_thumbnail_smooth(n: Numbers) -> Picture:
+    grid = Grid((61, 47), 2)
+    rows, columns = grid.at(2)
+    y, x = np.mgrid[:rows, :columns]
+    wave = 60 * np.sin(x / 3) + 50 * np.cos(y / 4)
+    lowest = np.rint([wave, wave / 3, -wave / 5]).astype(np.int32)
+    levels = [(n.integers(0, 6, (9, *grid.at(k))) // 6).astype(np.int32) for k in (1, 2)]
+    return one(view(planes.encoded(Latents(tuple(levels), lowest), grid.size, 192)))
 
 
 @_case("The smallest step", "pyramid: step")

@@ -7,7 +7,8 @@ from dataclasses import replace
 import msgpack
 
 from proxyimg_codec.codec.write import to_bytes
-from proxyimg_codec.container.chunks import read, write
+from proxyimg_codec.container import plan
+from proxyimg_codec.container.chunks import Chunk, read, write
 from proxyimg_codec.geometry.pose import Pose
 
 from ..builders import (
@@ -53,15 +54,32 @@ def _version_0_10(n: Numbers) -> bytes:
     """With what was possible in it alone."""
     chunks = [
         replace(c, payload=msgpack.packb(msgpack.unpackb(c.payload)[:7])) if c.type == "TEXR" else c
-        for c in read(to_bytes(pieces(n, {"disc": Pose(shift=(3 * 1024, -900))})))
+        for c in planes_first(to_bytes(pieces(n, {"disc": Pose(shift=(3 * 1024, -900))})))
     ]
     return write(chunks, (0, 10))
 
 
+def planes_first(data: bytes) -> list[Chunk]:
+    """Chunks of a file as they were before 0.12: PLAN is short, and stands before TEXR.
+
+    Args:
+        data: File of the present version.
+    """
+    chunks = []
+    for chunk in read(data):
+        if chunk.type == plan.TYPE:
+            *values, _, _, escapes, stream = msgpack.unpackb(chunk.payload)
+            chunk = replace(chunk, payload=msgpack.packb([*values, escapes, stream]))
+        chunks.append(chunk)
+    order = ["HEAD", "LAYR", "MESH", "POSE", "NETW", "PLAN", "TEXR"]
+    return sorted(chunks, key=lambda c: order.index(c.type) if c.type in order else len(order))
+
+
 @_case("A file of version 0.11, whose pyramid textures end with unmix", "file: version", "CON-19",
-       "pyramid: cuts")  # fmt: skip
+       "CON-20", "pyramid: cuts")  # fmt: skip
 def _version_0_11(n: Numbers) -> bytes:
-    return write(read(to_bytes(pieces(n, {"disc": Pose(shift=(3 * 1024, -900))}))), (0, 11))
+    moved = pieces(n, {"disc": Pose(shift=(3 * 1024, -900))})
+    return write(planes_first(to_bytes(moved)), (0, 11))
 
 
 @_case("A file of version 0.2 with arrays", "file: version", "fields: maps")

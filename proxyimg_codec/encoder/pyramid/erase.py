@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from ...texture import planes as coded
+from ...texture.context import SHIFT_ORIGIN
 from ...texture.grid import Grid, by_channel
-from ...texture.latents import SHIFT_ORIGIN, Latents
+from ...texture.latents import Latents
 from ...texture.network import Floats
 from ...texture.planes import Planes
 from ..completion.membrane import continued_from
@@ -157,7 +158,7 @@ class _Erasure(Job):
         while True:
             made = coded.encoded(
                 Latents(tuple(found[:-1]), found[-1]), self.old.size, packed["step"], self.cells,
-                self.cell, self.old.components, packed["model"], tuple(shifts),
+                self.cell, self.old.components, packed["model"], tuple(shifts), packed["tile"],
             )  # fmt: skip
             lost = [
                 2 * k + group

@@ -13,10 +13,11 @@ from proxyimg_codec.encoder.pyramid.load import load, native_bfloat16
 from proxyimg_codec.encoder.pyramid.model import LEVELS, Model, plain_synthesis
 from proxyimg_codec.encoder.pyramid.similarity import ms_ssim
 from proxyimg_codec.entropy import laplace
-from proxyimg_codec.texture import context, registered_model, synthesis
+from proxyimg_codec.texture import context, registered_model
 from proxyimg_codec.texture.grid import Grid
 from proxyimg_codec.texture.latents import Latents
 from proxyimg_codec.texture.planes import encoded
+from tests.support.pyramids import synthesized
 
 STEP = 300
 conv2d = functional.conv2d
@@ -73,7 +74,7 @@ def test_synthesis_is_the_decoders(exact, size):
         ours = exact.synthesise(found, step_of(STEP), size)[0].permute(1, 2, 0).numpy()
     own = whole(found)
     weights, grid = registered_model.registered(2), Grid(size[::-1], 4)
-    theirs = synthesis.samples(weights, grid, own.levels, own.lowest, STEP)
+    theirs = synthesized(weights, grid, own, STEP)
     assert np.abs(ours - theirs).max() < 0.01
 
 
