@@ -104,7 +104,8 @@ def plan(columns: int, rows: int, levels: int = 3, data: bytes = b"") -> Values:
     return {
         "model": 1, "size": [columns, rows], "components": 3, "step": 512, "levels": levels,
         "grey": 0, "lowest": [0, 0, 0], "shifts": [0, 0] * levels, "cell": 8, "support": b"",
-        "escapes": b"", "data": data or b"\0" + (1 << 16).to_bytes(4, "little") + bytes(4),
+        "tile": 0, "details": [], "escapes": b"",
+        "data": data or b"\0" + (1 << 16).to_bytes(4, "little") + bytes(4),
     }  # fmt: skip
 
 

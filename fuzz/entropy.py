@@ -60,7 +60,8 @@ def _planes(head: bytes, first: bytes, second: bytes) -> Any:
     """Decodes the latents of planes."""
     levels, components = 1 + head[3] % 4, (1, 3)[head[3] >> 7]
     fields = {
-        "model": 1, "size": [1 + head[1] % 40, 1 + head[2] % 40], "components": components,
+        "model": 1, "size": [1 + head[1] % 40 + 110 * (head[3] >> 6 & 1), 1 + head[2] % 40],
+        "components": components, "tile": 6 * (head[3] >> 5 & 1), "details": [],
         "step": 5 * (head[4] & 127), "levels": levels,
         "grey": levels if components == 1 else (head[4] >> 7) * levels // 2,
         "lowest": [head[5] & 63] * components, "shifts": [head[6] & 15, head[6] >> 4] * levels,
@@ -123,6 +124,12 @@ def seeds() -> list[bytes]:
         latents = Latents(levels, rng.integers(-200, 200, (3, 4, 4), np.int32))
         made = planes.encoded(latents, (16, 12), 300, shifts=(shift - 8,) * 4).packed
         put(3, (*head[:4], made["lowest"][0], head[5]), made["data"], made["escapes"])
+    shapes = [(9, 4, 66), (9, 2, 33)]
+    levels = tuple(rng.integers(-3, 3, s, np.int32) for s in shapes)
+    latents = Latents(levels, rng.integers(-90, 90, (3, 2, 33), np.int32))
+    made = planes.encoded(latents, (130, 6), 300, shifts=(0,) * 4, tile=6, number=1).packed
+    head = (19, 5, 0b11100001, 60, made["lowest"][0], 8 * 17)
+    put(3, head, made["data"], made["escapes"])
     return out
 
 

@@ -10,21 +10,26 @@ _listener: ContextVar[Callable[[int], None] | None] = ContextVar("_listener", de
 
 
 @contextmanager
-def heard(listener: Callable[[int], None]) -> Iterator[None]:
+def heard(by: Callable[[int], None]) -> Iterator[None]:
     """Context in which a function hears of work.
 
     Args:
-        listener: Called with amounts of work that was done. What it raises stops the work.
+        by: Called with amounts of work that was done. What it raises stops the work.
     """
-    token = _listener.set(listener)
+    token = _listener.set(by)
     try:
         yield
     finally:
         _listener.reset(token)
 
 
+def listener() -> Callable[[int], None] | None:
+    """Function that hears of work in this context, or None."""
+    return _listener.get()
+
+
 def worked(amount: int) -> None:
     """Tells that an amount of work is done; raises what the listener raises."""
-    listener = _listener.get()
-    if listener is not None:
-        listener(amount)
+    told = _listener.get()
+    if told is not None:
+        told(amount)

@@ -23,6 +23,7 @@ struct Level {
     const uint8_t *bands;    // [height][width], bit b set where band b is coded
     const int32_t *given;    // [9][height][width] to encode, or null to decode
     int32_t *latents;        // [9][height][width], 0
+    int (*watch)(int done, int all);  // hears of progress, and stops the work by a 1; or null
 };
 
 typedef Linear<Whole, 2> Layer;
@@ -108,11 +109,17 @@ class LevelCoder {
         }
     }
 
+    // Tells what is done, now and then; whether to stop.
+    bool stopped(int done) const {
+        return s.watch && done % 16 == 0 && s.watch(done, h + w + 3 * (h - 1));
+    }
+
     // What does not depend on the level itself.
-    void look_ahead() {
+    Wrong look_ahead() {
         int16_t *last_in = inputs.data() + 2 * in_row, *last = rows.data() + 2 * row;
         read(0, last_in);
         for (int y = 0; y <= h; y++) {
+            if (stopped(y)) return STOPPED;
             std::memmove(inputs.data(), inputs.data() + in_row, 2 * in_row * sizeof(int16_t));
             std::memmove(rows.data(), rows.data() + row, 2 * row * sizeof(int16_t));
             read(y + 1, last_in);
@@ -130,6 +137,7 @@ class LevelCoder {
                     put(ahead.data() + i * width + o, scaled(v, s.net.second_bits), -32768, 32767);
                 });
         }
+        return NOTHING;
     }
 
     // Codes the positions of a wave.
@@ -234,8 +242,9 @@ class LevelCoder {
 
     // Codes the level.
     Wrong run() {
-        look_ahead();
+        if (const Wrong wrong = look_ahead()) return wrong;
         for (at = 0; at < w + 3 * (h - 1); at++) {
+            if (stopped(h + at)) return STOPPED;
             ys.clear();
             for (int y = std::max((at - w + 3) / 3, 0); y <= std::min(at / 3, h - 1); y++)
                 if (s.bands[(int64_t)y * w + at - 3 * y]) ys.push_back(y);

@@ -37,8 +37,7 @@ int pxi_pyramid_level(Level *level) {
 // Synthesis of a level of a pyramid; what went wrong, if anything.
 int pxi_pyramid_synthesis(const Synthesis *level) {
     try {
-        Synthesizer(*level).run();
-        return NOTHING;
+        return Synthesizer(*level).run();
     } catch (const std::bad_alloc &) {
         return NO_MEMORY;
     }

@@ -27,7 +27,7 @@ struct Sink {  // what is encoded: symbols in groups, and the differences that e
     int64_t n_symbols, n_groups, n_escapes;
 };
 
-enum Wrong { NOTHING, STREAM_ENDS, ESCAPES_END, OUT_OF_RANGE, NO_MEMORY };
+enum Wrong { NOTHING, STREAM_ENDS, ESCAPES_END, OUT_OF_RANGE, NO_MEMORY, STOPPED };
 
 struct Symbol {  // a latent and where it is found in the tables
     int32_t row, centre, shift, low;  // row < 0: certainly 0

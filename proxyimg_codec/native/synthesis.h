@@ -1,6 +1,7 @@
 // The synthesis of the pyramid, texture/synthesis.py; numpy is its judge, within rounding.
 #pragma once
 
+#include "laplace.h"
 #include "linear.h"
 
 struct Synthesis {  // of one level: weights [out][in].., as in texture/registered_model.py
@@ -9,6 +10,7 @@ struct Synthesis {  // of one level: weights [out][in].., as in texture/register
     const float *low;                              // [height][width][3]
     const int32_t *latents;                        // [9][height][width]
     float *out;                                    // [rows][columns][3]
+    int (*watch)(int done, int all);               // as in struct Level
 };
 
 class Synthesizer {
@@ -125,11 +127,12 @@ class Synthesizer {
         }
     }
 
-    void run() {
+    Wrong run() {
         float *last_in = inputs.data() + 2 * in_row, *last = rows.data() + 2 * row;
         read(0, last_in);
         for (int r = 0; r < 4; r++) read_wide(r - 2, wide.data() + (r + 1) * wide_row);
         for (int y = 0; y <= h; y++) {  // the hidden units are a row ahead
+            if (s.watch && y % 8 == 0 && s.watch(y, h + 1)) return STOPPED;
             std::memmove(inputs.data(), inputs.data() + in_row, 2 * in_row * sizeof(float));
             std::memmove(rows.data(), rows.data() + row, 2 * row * sizeof(float));
             read(y + 1, last_in);
@@ -142,5 +145,6 @@ class Synthesizer {
             read_wide(y + 1, wide.data() + 4 * wide_row);
             write(y - 1);
         }
+        return NOTHING;
     }
 };

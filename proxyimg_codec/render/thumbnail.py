@@ -31,7 +31,7 @@ ERROR_MAX = 1.4
 UNKNOWN = 12.0
 """Root mean square that a level is taken to add where a file does not tell."""
 
-SPAN_MIN = 1.5
+SPAN_MIN = 1.4
 """Fewest samples that are left for an output pixel, across and down."""
 
 STRIP = 64

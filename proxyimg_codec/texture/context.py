@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..entropy import laplace
+from ..progress import worked
 from . import registered_model
 from .convolution import by_row, convolved, strips
 from .grid import Bands, Window, mirrored_indices
@@ -212,6 +213,7 @@ class LevelCoder:
             given = None if source is None else source[:, at].T.astype(np.int64)
             found = self._wave(coder, ahead[at], around.astype(np.float32), there, given)
             latents[:, at] = found.T
+            worked(len(at))
             seen[place, :9] = _squashed(found, 1)
             seen[place, 9:] = log_feature(found)
         return out

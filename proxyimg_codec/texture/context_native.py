@@ -13,6 +13,7 @@ from ..errors import FormatError, LimitError
 from ..native import kernel
 from . import context
 from .context import Ints, Place
+from .watch import WATCH, Watch
 
 WEIGHTS = (
     "first", "first_bias", "second", "second_bias", "causal", "mix", "mix_bias", "luma",
@@ -75,6 +76,7 @@ class _Level(ct.Structure):
         ("logs", ct.c_void_p),
         ("n_logs", ct.c_int64),
         *((n, ct.c_void_p) for n in ("low", "parent", "bands", "given", "latents")),
+        ("watch", WATCH),
     ]
 
 
@@ -148,6 +150,7 @@ def _run(at: Place, values: Ints | None, source: _Source, sink: _Sink, latents: 
         alive.append(np.ascontiguousarray(array, dtype))
         return kernel.pointer(alive[-1])
 
+    watch = Watch(h * w)
     parts = {n: getattr(weights, n).values for n in WEIGHTS} | {"first_bias": coder.first_bias}
     level = _Level(
         _Net(
@@ -165,9 +168,10 @@ def _run(at: Place, values: Ints | None, source: _Source, sink: _Sink, latents: 
         address(context.LOG, np.int32), len(context.LOG),
         address(at.low, np.int32), address(at.parent, np.int32), address(at.bands, np.uint8),
         None if values is None else address(values, np.int32),
-        kernel.pointer(latents),
+        kernel.pointer(latents), watch.function,
     )  # fmt: skip
     wrong = lib.pxi_pyramid_level(ct.byref(level))
+    watch.check()
     if wrong == STREAM_ENDS:
         raise FormatError(rans.TOO_SHORT, rule="ENT-6")
     if wrong == ESCAPES_END:

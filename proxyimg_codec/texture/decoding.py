@@ -14,18 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FormatError
-from ..progress import worked
 from . import registered_model, synthesis
 from .context import BAD_ESCAPES, REACH, Ints, Place, next_plain
 from .grid import Bands, Grid, Window
 from .latents import Decoder, Latents, above, code_lowest
 from .network import Floats
 
-BLOCK = 7
+BLOCK = 5
 """Binary logarithm of the side of the squares that are made at once."""
 
 STRIP = 256
-"""Rows that are made at once, so that programs hear of progress."""
+"""Rows that are made at once, which bounds memory."""
 
 AROUND = 3
 """Positions around a window, on all sides, that its synthesis depends on."""
@@ -224,7 +223,6 @@ class Decoding:
         if level == 1 or self._grid.tiles(level - 1, self._fields["tile"]):
             coder.finish(self._where)
         self._coder, self._read = coder, level
-        worked(whole.area)
 
     def _tiles_of(self, level: int) -> list[tuple[Window, int]]:
         """Tiles of a level that are not read yet, and the numbers of their streams."""
@@ -264,7 +262,6 @@ class Decoding:
             coder.finish(self._where)
         finally:
             out[:, *tile.at] = found[:, *tile.inside(outer)]
-        worked(tile.area)
 
     def _plain(self, level: int, window: Window) -> Ints:
         """Plain planes int32 [3, h, w] of a level, of which a window is made."""
@@ -304,7 +301,6 @@ class Decoding:
         high = self._latents(level + 1, above)[:, *above.at]
         low = self._low(level + 1, above)[above.at]
         out = synthesis.finer(self._model, level + 1, low, high, self._fields["step"], under.shape)
-        worked(above.area)
         return out[window.inside(under)]
 
     def _coloured(self, planes: Floats, level: int) -> Floats:

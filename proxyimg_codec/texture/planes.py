@@ -25,7 +25,7 @@ LARGE = 1 << 20
 """Samples from which on a raster has tiles by default."""
 
 TILES, TILE_BYTES, TILES_SHARE = (7, 8, 9), 13, 0.005
-"""Binary logarithms of sides of tiles, about what a tile costs, and the share of all bytes that tiles
+"""Binary logarithms of sides of tiles, bytes that a tile costs, and the share of all that tiles
 may cost: the smallest tiles are taken that cost no more."""
 
 DETAIL_UNIT, DETAIL_MAX = 8, 255
@@ -43,6 +43,10 @@ class Planes:
 
     packed: Mapping[str, Any]
     where: str = "chunk PLAN"
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but what was decoded."""
+        return {k: v for k, v in self.__dict__.items() if not isinstance(v, Decoding)}
 
     @property
     def size(self) -> tuple[int, int]:

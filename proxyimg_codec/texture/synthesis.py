@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..native import kernel
+from ..progress import worked
 from . import synthesis_native
 from .context import Ints
 from .convolution import by_row, convolved, strips
@@ -170,6 +171,7 @@ def _filtered(
         straight = convolved(wide, wavelets, 2, 2 + bottom - top).reshape(-1, w + 4, 12)
         z = z.reshape(-1, w, 12) + straight[:, 2:-2]
         out[top:bottom] = z.reshape(-1, w, 2, 6).swapaxes(1, 2)
+        worked((bottom - top) * w)
     return np.ascontiguousarray(out.reshape(2 * h, 2 * w, 3)[: shape[0], : shape[1]])
 
 

@@ -14,6 +14,7 @@ from ..native import kernel
 from .context import Ints
 from .network import Floats
 from .registered_model import Synthesis
+from .watch import WATCH, Watch
 
 ARRAYS = (
     "linear", "first", "first_bias", "second", "second_bias", "third", "third_bias", "gain",
@@ -27,6 +28,7 @@ class _Level(ct.Structure):
         *((n, ct.c_void_p) for n in ARRAYS),
         *((n, ct.c_int32) for n in ("hidden", "height", "width", "rows", "columns")),
         *((n, ct.c_void_p) for n in ("low", "latents", "out")),
+        ("watch", WATCH),
     ]
 
 
@@ -59,10 +61,13 @@ def finer(
     arrays = [np.ascontiguousarray(own[n], np.float32) for n in ARRAYS]
     low, latents = np.ascontiguousarray(low), np.ascontiguousarray(latents, np.int32)
     out = np.empty((*shape, 3), np.float32)
+    watch = Watch(h * w)
     level = _Level(
         *map(kernel.pointer, arrays), len(bias), h, w, *shape,
-        *map(kernel.pointer, (low, latents, out)),
+        *map(kernel.pointer, (low, latents, out)), watch.function,
     )  # fmt: skip
-    if lib.pxi_pyramid_synthesis(ct.byref(level)):
+    wrong = lib.pxi_pyramid_synthesis(ct.byref(level))
+    watch.check()
+    if wrong:
         raise LimitError("there is not enough memory to decode a pyramid")
     return out

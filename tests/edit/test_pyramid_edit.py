@@ -259,7 +259,7 @@ def test_an_edit_that_adds_planes_numbers_no_others_anew(pyramid, tmp_path):
     new = [
         c.type for c in after if (c.type, c.payload) not in {(b.type, b.payload) for b in before}
     ]
-    assert new == ["PLAN", "TEXR"]
+    assert new == ["TEXR", "PLAN"]
     assert only.undone().to_bytes() == start.to_bytes()
     assert pxi.from_bytes(only.to_bytes()).to_bytes() == only.to_bytes()
 

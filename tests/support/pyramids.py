@@ -1,6 +1,7 @@
 """Made-up pyramid textures: their samples come from a name, not from coded planes."""
 
 import zlib
+from functools import partial
 
 import numpy as np
 
@@ -38,8 +39,12 @@ def unpacked(fields, where=""):
 
 def showing(source, samples):
     """Planes, whose samples are replaced."""
-    source.__dict__["samples"] = lambda window: samples
+    source.__dict__["samples"] = partial(_given, samples)
     return source
+
+
+def _given(samples, window):
+    return samples
 
 
 def planes(name, size=SIZE, components=3):

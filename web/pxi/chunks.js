@@ -191,11 +191,11 @@ function checkPlans({ plans, textures }, limits) {
     need(plan.components === 3 || plan.grey === plan.levels, "grey planes with chroma");
     need(plan.lowest.length === plan.components, "the number of lowest scales is wrong");
     need(plan.shifts.length === 2 * plan.levels, "the number of shifts is wrong");
-    need(!plan.tile || plan.tile >= 6, "a tile is too small");
-    need([0, plan.levels].includes(plan.details.length), "the number of details is wrong");
     const [columns, rows] = plan.size.map((n) => Math.ceil(n / 2 ** plan.levels) * 2 ** plan.levels);
     limits.spend("samples", columns * rows);
     limits.spend("wavefronts", columns + 3 * rows);
+    need(!plan.tile || plan.tile >= 6, "a tile is too small");
+    need([0, plan.levels].includes(plan.details.length), "the number of details is wrong");
   }
   const met = new Set();
   for (const { coder, planes, alpha, behind, behind_alpha: soft } of textures) {

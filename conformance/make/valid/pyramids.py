@@ -281,7 +281,8 @@ def _pyramid_tiles_deep(n: Numbers) -> Picture:
        "pyramid: tiles", "pyramid: support")  # fmt: skip
 def _pyramid_tiles_support(n: Numbers) -> Picture:
     cells = np.zeros(planes.cells_of((129, 129), 3), bool)
-    cells[16, 16] = cells[7, 15] = cells[1, 8] = True
+    for at in ((16, 16), (7, 15), (16, 2), (2, 16)):
+        cells[at] = True
     return one(view(coded(n, (129, 129), levels=1, cells=cells, tile=6)))
 
 
