@@ -171,11 +171,19 @@ class _Painter:
     @property
     def needs(self) -> tuple[Planes, Window] | None:
         """Planes of the layer and the samples of their raster to decode; None if there are none."""
-        texture = self._layer.texture
+        texture, view = self._layer.texture, self._view
         if not isinstance(texture, PyramidTexture):
             return None
         x, y, width, height = texture.part
-        w = self._window or Window(0, height, 0, width)
+        if self._window is None:
+            return texture.planes, Window(y, y + height, x, x + width)
+        left, top, right, bottom = self._layer.box
+        right, bottom = left + right, top + bottom
+        across = left < view.x + view.region_width and view.x < right
+        down = top < view.y + view.region_height and view.y < bottom
+        if not (across and down):
+            return None
+        w = self._window
         return texture.planes, Window(w.top + y, w.bottom + y, w.left + x, w.right + x)
 
     def sheet(self, box: Rectangle) -> Sheet:

@@ -75,9 +75,8 @@ def render(
     with kernel.for_engine(engine), enough_memory("to draw the picture; ask for a smaller one"):
         result = _fitting(out, shape, kind)
         put = partial(_put, result)
-        planes = thumbnail.raster(picture, chosen, view)
         engines.find(engine)
-        if planes is not None:
+        if (planes := thumbnail.raster(picture, chosen, view)) is not None:
             thumbnail.draw(planes, view, put, progress)
         else:
             compose(picture, view, chosen, engine, put, limits, cache, progress)

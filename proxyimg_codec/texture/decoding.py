@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FormatError
+from ..progress import worked
 from . import registered_model, synthesis
 from .context import BAD_ESCAPES, REACH, Ints, Place, next_plain
 from .grid import Bands, Grid, Window
@@ -271,12 +272,14 @@ class Decoding:
         out = self._array("plain", level, (3, *grid.at(level)), np.int32)
         made = self._made["plain", level]
         for part in list(made.lacking(window)):
-            above = part.halved().grown(AROUND, grid.at(level + 1))
-            low = self._plain(level + 1, above)[:, *above.at]
-            high = self._latents(level + 1, above)[:, *above.at]
-            under = above.doubled(grid.at(level))
-            found = next_plain(low, high, under.shape)
-            out[:, *part.at] = found[:, *part.inside(under)]
+            for strip in _strips(part):
+                above = strip.halved().grown(AROUND, grid.at(level + 1))
+                low = self._plain(level + 1, above)[:, *above.at]
+                high = self._latents(level + 1, above)[:, *above.at]
+                under = above.doubled(grid.at(level))
+                found = next_plain(low, high, under.shape)
+                out[:, *strip.at] = found[:, *strip.inside(under)]
+                worked(0)  # it takes little time, but enough to be asked to stop
             made.add(part)
         return out
 

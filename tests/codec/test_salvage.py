@@ -110,7 +110,10 @@ def test_the_more_arrives_the_better(flat, caplog):
             else:
                 expected = full if level > LEVELS - count else 0 * full
                 np.testing.assert_array_equal(found, expected)
-        np.testing.assert_array_equal(latents(image).lowest, latents(whole).lowest)
+        known = slice(None) if count else slice(1)  # the lowest planes may end early, too
+        np.testing.assert_array_equal(
+            latents(image).lowest[:, known, known], latents(whole).lowest[:, known, known]
+        )
         quality.setdefault(count, psnr(image, whole))
         assert count == max(quality)
     assert sorted(quality) == list(range(LEVELS)), "the cuts meet every level"
