@@ -245,14 +245,14 @@ class Decoding:
         if not self._cut and number != len(self._streams):
             raise FormatError(
                 f"there are {len(self._streams)} streams of {number} tiles", self._where,
-                rule="PYR-53",
+                rule="PYR-54",
             )  # fmt: skip
 
     def _read_tile(self, level: int, tile: Window, number: int, out: Ints) -> None:
         """Reads a tile into the latents of a level."""
         assert self._streams is not None, "they are split"
         if number >= len(self._streams):
-            raise FormatError("the stream of a tile is missing", self._where, rule="PYR-53")
+            raise FormatError("the stream of a tile is missing", self._where, rule="PYR-54")
         outer = tile.grown(REACH, self._grid.at(level))
         place, outer = self._place(level, outer).tile(tile)
         escapes, stream = self._streams[number]
@@ -359,7 +359,7 @@ def split(data: bytes, at: int, cut: bool) -> Iterator[tuple[bytes, bytes]]:
         digits = next((k for k, byte in enumerate(number, 1) if byte < 128), 0)
         count = sum((byte & 127) << (7 * k) for k, byte in enumerate(number[:digits]))
         if (not digits or at + digits + count > len(data)) and not cut:
-            raise FormatError(BAD_ESCAPES, rule="PYR-53")
+            raise FormatError(BAD_ESCAPES, rule="PYR-54")
         at += digits or len(number)
         escapes = data[at : at + count]
         at += len(escapes)

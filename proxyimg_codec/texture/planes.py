@@ -175,7 +175,7 @@ def unpack(fields: Mapping[str, Any], where: str = "chunk PLAN") -> Planes:
     tile, details = fields["tile"], fields["details"]
     if 0 < tile < TILE_MIN or len(details) not in (0, levels):
         raise FormatError("a tile is too small, or details do not fit the levels", where,
-                          rule="PYR-53")  # fmt: skip
+                          rule="PYR-54")  # fmt: skip
     return Planes(fields, where)
 
 

@@ -182,7 +182,7 @@ function checkPoses({ poses, meshes }) {
   }
 }
 
-/** PYR-1 to PYR-3, PYR-53 and PYR-54, and the limits of SEC-2. */
+/** PYR-1 to PYR-3, PYR-54 and PYR-55, and the limits of SEC-2. */
 function checkPlans({ plans, textures }, limits) {
   for (const plan of plans) {
     supported(plan.model in MODEL_FILES, `model ${plan.model}`);

@@ -454,7 +454,7 @@ const BEFORE = [-2, -1, 0].flatMap((j) => [-2, -1, 0, 1, 2].map((i) => [j, i])).
 const BEFORE_Y = Int32Array.from(BEFORE, ([j]) => j);
 const BEFORE_X = Int32Array.from(BEFORE, ([, i]) => i);
 
-/** Tiles of a level (PYR-53); one, if it has none. */
+/** Tiles of a level (PYR-54); one, if it has none. */
 function tilesOf({ tile }, rows, columns) {
   const side = tile ? 2 ** tile : Math.max(rows, columns);
   const tiles = [];
@@ -467,7 +467,7 @@ function tilesOf({ tile }, rows, columns) {
   return tiles;
 }
 
-/** The coder of the first tile in some bytes, and the bytes behind it (PYR-53). */
+/** The coder of the first tile in some bytes, and the bytes behind it (PYR-54). */
 function tileCoder(bytes, most) {
   let count = 0;
   let at = 0;
