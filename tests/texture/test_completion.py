@@ -48,11 +48,12 @@ def nearest(a, n):
 
 
 def mean_of(pairs):
-    """Bounded mean differences of pairs of lists, or None if there are none."""
+    """Mean differences of pairs of lists; None if there are none, or one is too large."""
     if not pairs:
         return None
     sums = [sum(int(a[c]) - int(b[c]) for a, b in pairs) for c in range(len(pairs[0][0]))]
-    return [min(max(nearest(v, len(pairs)), -LIFT), LIFT) for v in sums]
+    means = [nearest(v, len(pairs)) for v in sums]
+    return means if all(abs(v) <= LIFT for v in means) else None
 
 
 def lifts_by_the_rule(values, known, references):
@@ -86,7 +87,8 @@ def lifts_by_the_rule(values, known, references):
         start = k * side - side // 2, m * side - side // 2
         rim = pairs(there, copies((k, m)), *start, side + 2 * (side // 2))
         weight = math.ceil(Fraction(RIM_WEIGHT * min(len(rim), side * side), side * side))
-        aims[k, m] = weight, mean_of(rim) or [0] * len(values)
+        aim = mean_of(rim)
+        aims[k, m] = weight if aim else 0, aim or [0] * len(values)
     lifts = {cell: [0] * len(values) for cell in cells}
     for turn in range(2 * TURNS):
         for cell in cells:
