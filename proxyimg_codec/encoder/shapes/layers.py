@@ -175,7 +175,7 @@ def regions_of_picture(picture: Floats, settings: Settings) -> list[Region]:
         settings: Settings of the encoder.
 
     Returns:
-        Disjoint regions back to front; none if the picture is clear everywhere.
+        Regions back to front; none if the picture is clear everywhere.
 
     Raises:
         UsageError: There is no such segmenter.
