@@ -180,13 +180,13 @@ class PyramidTexture:
         """
         trusted = self.shown if self.cuts is None else self.cuts.trusted
         assert trusted is not None, "nothing is to be filled"
-        values, known = self._known(trusted)
+        values, known = self.known(trusted)
         if self.copies is not None:
             values, known = completed(values, known, self.copies)
         out = diffused(values, known).astype(np.uint16)
         return np.ascontiguousarray(np.moveaxis(out, 0, 2)).reshape(-1, len(out))
 
-    def _known(self, trusted: Samples) -> tuple[Values, Samples]:
+    def known(self, trusted: Samples) -> tuple[Values, Samples]:
         """Samples that are known before any is copied or filled [PYR-42, PYR-47].
 
         Args:

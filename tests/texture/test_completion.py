@@ -284,7 +284,7 @@ def test_copies_come_from_what_is_behind_too():
     references = Copies(1, np.array([[-2, 0]], np.int32), np.zeros((9, 11), np.uint8))
     references.sources[4, 5] = 1
     made = hidden_view(behind=own, copies=references)
-    values, known = made._known(made.shown)
+    values, known = made.known(made.shown)
     values, known = completed(values, known, references)
     assert known[8, 10]
     assert not made.shown[8, 10]

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...texture.completion import Copies
+from ...texture.completion import FILL_ONE, Copies
 from ...texture.network import Floats
 from ...texture.occlusion import Occlusion, Samples
+from ...texture.pyramid import PyramidTexture
 from ..settings import Settings
 from .references import references
 
@@ -33,6 +34,28 @@ def copies_of(picture: Floats, cuts: Occlusion | None, settings: Settings) -> Co
     colours = np.ascontiguousarray(part[..., :3] * np.float32(255))
     always = settings.background == "exemplar"
     return references(colours, known & (part[..., 3] >= OPAQUE), wanted, settings.seed, always)
+
+
+def copies_of_texture(texture: PyramidTexture) -> Copies | None:
+    """Chooses what the hidden samples of a texture copy, from what its planes have.
+
+    Args:
+        texture: A texture of which not all samples show.
+
+    Returns:
+        As `copies_of`.
+    """
+    if texture.cuts is not None:
+        trusted, wanted = hidden_in(texture.cuts)
+    else:
+        assert texture.shown is not None, "nothing is hidden"
+        trusted, wanted = texture.shown, ~texture.shown
+    values, known = texture.known(trusted)
+    samples = np.moveaxis(values, 0, 2) / np.float32(FILL_ONE)
+    colours = samples[..., :-1] if texture.alpha is not None else samples
+    alpha = samples[..., -1] if texture.alpha is not None else np.ones(known.shape)
+    rgb = np.ascontiguousarray(np.broadcast_to(colours, (*known.shape, 3)) * np.float32(255))
+    return references(rgb, known & (alpha >= OPAQUE), wanted & ~known, seed=0)
 
 
 def hidden_in(cuts: Occlusion) -> tuple[Samples, Samples]:
