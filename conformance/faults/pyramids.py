@@ -225,7 +225,7 @@ bands_of, mirrored_of, level_of = Grid.bands, grid.mirrored_indices, LevelCoder.
 grid_of, wave_of, escape_of = Grid.of, LevelCoder._wave, latents.Decoder._escape
 position_of, samples_of = pyramid._position, PyramidTexture._samples
 unpack_of, premultiplied_of = pyramid.unpack, compose.premultiplied
-moved_of, known_of = Occlusion.moved, PyramidTexture._known
+moved_of, known_of = Occlusion.moved, PyramidTexture.known
 still_of, neighbours_of = Pose.still, neighbours.moved_neighbours
 copies_of, weights_of, bases_of = completion.unpack, completion._weights, completion._bases
 
@@ -285,8 +285,8 @@ _FAULTS: dict[str, list[Patch]] = {
     "loses-rims-of-what-moves-together": [(Occlusion, "moved", _back_bares)],
     "ignores-behind": [(pyramid, "unpack", _without("behind", "behind_alpha"))],
     "ignores-alpha-behind": [(pyramid, "unpack", _without("behind_alpha"))],
-    "behind-over-trusted": [(PyramidTexture, "_known", _over_trusted)],
-    "behind-without-cells": [(PyramidTexture, "_known", _everywhere_behind)],
+    "behind-over-trusted": [(PyramidTexture, "known", _over_trusted)],
+    "behind-without-cells": [(PyramidTexture, "known", _everywhere_behind)],
     "ignores-references": [(pyramid, "unpack", _without("copies"))],
     "offsets-down-first": [(pyramid, "unpack", _down_first)],
     "sources-without-upper-bits": [(pyramid, "unpacked_copies", _low_sources)],

@@ -54,7 +54,9 @@ def copies_of_texture(texture: PyramidTexture) -> Copies | None:
     samples = np.moveaxis(values, 0, 2) / np.float32(FILL_ONE)
     colours = samples[..., :-1] if texture.alpha is not None else samples
     alpha = samples[..., -1] if texture.alpha is not None else np.ones(known.shape)
-    rgb = np.ascontiguousarray(np.broadcast_to(colours, (*known.shape, 3)) * np.float32(255))
+    rgb = np.ascontiguousarray(
+        np.broadcast_to(colours, (*known.shape, 3)) * np.float32(255), np.float32
+    )
     return references(rgb, known & (alpha >= OPAQUE), wanted & ~known, seed=0)
 
 

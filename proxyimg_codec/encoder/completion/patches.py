@@ -40,6 +40,9 @@ LEAST = 4.0
 FEW = 300
 """Fewest whole patches to choose from at the coarsest level."""
 
+TRIALS = 4
+"""Times that the coarsest level begins at random; the best one goes on."""
+
 MOST = 12000
 """Most patches of a level; finer levels are left out."""
 
@@ -75,20 +78,25 @@ def guessed(features: Floats, known: Pixels, hole: Pixels, seed: int) -> Guess:
         seed: Seed of the random search.
     """
     rng = np.random.default_rng([seed, 17])
-    levels = _levels(features, known, hole)
-    found: _Level | None = None
-    scale = 1
-    for number, (features, seen, wanted) in enumerate(reversed(levels)):
-        level = _Level(features, seen, wanted)
-        if found is not None and len(level.rows) > MOST:
+    *finer, coarsest = _levels(features, known, hole)
+    tried = [_found(_Level(*coarsest), None, ROUNDS[0], rng) for _ in range(TRIALS)]
+    found, scale = min(tried, key=lambda level: float(level.apart.mean())), 2 ** len(finer)
+    for number, planes in enumerate(reversed(finer), 1):
+        level = _Level(*planes)
+        if len(level.rows) > MOST:
             break
-        level.begin(found, rng)
-        for k in range(ROUNDS[min(number, len(ROUNDS) - 1)]):
-            level.search(rng, 2 if k else 3)
-            level.vote()
-        found, scale = level, 2 ** (len(levels) - 1 - number)
-    assert found is not None
-    return _enlarged(found, scale, levels[0][0], hole)
+        found = _found(level, found, ROUNDS[min(number, len(ROUNDS) - 1)], rng)
+        scale //= 2
+    return _enlarged(found, scale, features, hole)
+
+
+def _found(level: _Level, coarse: _Level | None, rounds: int, rng: np.random.Generator) -> _Level:
+    """A level after all of its rounds, begun with what a coarser one has found, or at random."""
+    level.begin(coarse, rng)
+    for k in range(rounds):
+        level.search(rng, 2 if k else 3)
+        level.vote()
+    return level
 
 
 def features_of(colours: Floats, known: Pixels) -> Floats:
