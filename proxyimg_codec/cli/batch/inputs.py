@@ -86,10 +86,10 @@ def _found(
     """Each input, and its name within the folder of outputs."""
     for name in files:
         if is_pattern(name):
-            base = _WILD.split(name)[0].rpartition("/")[0]
+            base = os.path.dirname(_WILD.split(name)[0])
             matches = [v for v in glob.glob(name, recursive=True) if stacks or os.path.isfile(v)]
             for match in sorted(matches, key=_natural):
-                yield match, os.path.relpath(match, base) if base else match.lstrip("/")
+                yield match, os.path.relpath(match, base or ".")
         elif is_many(name, stacks):
             inside = [v for v in _below(name, os.path.realpath(out)) if takes(v)]
             if not inside:

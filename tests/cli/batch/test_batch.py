@@ -36,7 +36,7 @@ def test_all_are_made_and_told_in_order(texts, copy, jobs):
     err, lines = copy("in", "-o", "out/", jobs=jobs)
     assert outputs() == {"a": "ONE", "b": "TWO", "c": "THREE", "d": "FOUR", "e": "FIVE"}
     assert states(lines) == [(v, "made") for v in "abecd"]
-    said = [line.split(":")[0].rpartition("/")[2] for line in err.splitlines()]
+    said = [Path(line.split(": ")[0]).name for line in err.splitlines()]
     assert said[:-1] == [f"{v}.txt.out" for v in "abecd"]
     assert err.splitlines()[-1].startswith("out/: 5 made, 0 up to date, 0 failed, ")
     assert lines[0]["length"] == 3
@@ -46,14 +46,14 @@ def test_all_are_made_and_told_in_order(texts, copy, jobs):
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_failures_are_collected_and_the_others_are_made(texts, copy, jobs):
     texts(**{**FIVE, "b": "fails", "sub_c": "a bug"})
-    os.symlink("nowhere", "in/d.txt")
-    err, lines = copy("in", "-o", "out/", code=3, lines=3, jobs=jobs)
+    words = ("none.txt", "in", "-o", "out/")
+    err, lines = copy(*words, code=3, lines=3, jobs=jobs)
     assert set(outputs()) == {"a", "d", "e"}
-    assert [v.split(": ")[1] for v in err.splitlines()] == ["in/b.txt", "in/d.txt", "in/sub/c.txt"]
-    assert [v["exit_code"] for v in lines] == [0, 3, 3, 0, 1, 0]
+    names = [Path(v.split(": ")[1]).as_posix() for v in err.splitlines()]
+    assert names == ["none.txt", "in/b.txt", "in/sub/c.txt"]
+    assert [v["exit_code"] for v in lines] == [3, 0, 3, 0, 1, 0]
     assert "ZeroDivisionError" in lines[4]["error"]
     texts(b="mended", sub_c="mended")
-    os.remove("in/d.txt")
     _, lines = copy("in", "-o", "out/", "--resume", jobs=jobs)
     assert states(lines) == [
         ("a", "same"), ("b", "made"), ("e", "same"), ("c", "made"), ("d", "same")
@@ -143,10 +143,13 @@ def test_what_cannot_be_is_refused(texts, here, capsys, words, said):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_a_killed_process_takes_no_picture_with_it(texts, copy, traced):
-    texts(**{**FIVE, "b": "kills once"})
+    texts(**{**FIVE, "sub_d": "kills once"})
     _, lines = copy("in", "-o", "out/", jobs=2)
     assert states(lines) == [(v, "made") for v in "abecd"]
-    assert traced("end") == [f"{v}.txt" for v in "abcde"]
+    ended = traced("end")
+    assert set(ended) == {f"{v}.txt" for v in "abcde"}
+    # One other may have been under way, which ends with the pool; none that was finished is here.
+    assert len(ended) <= 6
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
@@ -155,7 +158,7 @@ def test_a_picture_that_kills_its_process_is_named(texts, copy, traced):
     err, lines = copy("in", "-o", "out/", code=6, jobs=2)
     assert "in/b.txt: its process was killed" in err
     assert states(lines)[1] == ("b", "failed")
-    assert traced("end") == [f"{v}.txt" for v in "acde"]
+    assert set(traced("end")) == {f"{v}.txt" for v in "acde"}
 
 
 def started(*words):

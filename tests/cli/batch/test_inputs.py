@@ -22,7 +22,8 @@ def texts(tmp_path, monkeypatch):
 
 
 def found(*files, out="out/", stacks=False):
-    return pairs(list(files), out, ".out", lambda name: name.endswith(".txt"), stacks)
+    got = pairs(list(files), out, ".out", lambda name: name.endswith(".txt"), stacks)
+    return [tuple(str(v).replace(os.sep, "/") for v in pair) for pair in got]
 
 
 def test_a_folder_is_mirrored_in_natural_order():
