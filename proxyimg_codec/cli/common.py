@@ -89,7 +89,8 @@ def run(prog: str, work: Callable[[], None]) -> int:
     except KeyboardInterrupt:
         code, message = 130, "interrupted"
     except SystemExit as end:  # raised by `ending` alone
-        code, message = int(end.code or 0), "terminated"
+        code = int(end.code or 0)
+        message = "interrupted" if code == 130 else "terminated"
     except Exception as error:  # what nobody expects is raised again
         known = failure(error)
         if known is None:

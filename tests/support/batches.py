@@ -34,6 +34,8 @@ def work(args: argparse.Namespace) -> dict:
             stage.write_text("unfinished")
             while not os.path.exists(args.trace + ".go"):
                 time.sleep(0.02)
+        except KeyboardInterrupt:  # as the refinement of a pyramid does
+            text = "what is found so far"
         finally:
             stage.unlink(missing_ok=True)
     write_atomically(args.output, (args.ending + text.upper()).encode())

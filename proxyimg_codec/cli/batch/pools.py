@@ -8,6 +8,7 @@ import signal
 import threading
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from types import FrameType
 from typing import Protocol
 
 from .work import Job, Outcome, perform
@@ -43,9 +44,21 @@ class Here:
     lone_retry = False
 
     def submit(self, job: Job) -> Future[Outcome]:
-        """Does a job."""
+        """Does a job.
+
+        Ctrl-C ends the batch. Encoding a single picture would take it as a wish for what is found
+        so far, but that is not what the settings ask for, and must not be recorded as such.
+        """
         future: Future[Outcome] = Future()
-        future.set_result(perform(job))
+        main = threading.current_thread() is threading.main_thread()
+        ours = main and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        if ours:
+            signal.signal(signal.SIGINT, _end)
+        try:
+            future.set_result(perform(job))
+        finally:
+            if ours:
+                signal.signal(signal.SIGINT, signal.default_int_handler)
         return future
 
     def close(self, ended: bool) -> None:
@@ -92,6 +105,10 @@ class Processes:
         self._pool.shutdown(cancel_futures=True)
         for name, value in self._before.items():
             os.environ.pop(name) if value is None else os.environ.update({name: value})
+
+
+def _end(number: int, frame: FrameType | None) -> None:
+    raise SystemExit(128 + number)
 
 
 def _start() -> None:

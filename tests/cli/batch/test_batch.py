@@ -198,6 +198,22 @@ def test_an_ended_batch_leaves_nothing_unfinished_and_goes_on(texts, copy, trace
     assert traced("end") == [f"{v}.txt" for v in "abcde"]
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_ctrl_c_ends_a_batch_of_one_process_and_nothing_half_found_counts(texts, copy, traced):
+    texts(**{**FIVE, "b": "waits"})
+    process = started("in", "-o", "out/", "-j", "1")
+    until(lambda: list(Path("out").rglob(".pxi-stage")))
+    process.send_signal(signal.SIGINT)
+    err = process.communicate(timeout=60)[1]
+    assert process.returncode == 130
+    assert err.splitlines()[-1] == "pxi-test: interrupted"
+    assert set(outputs()) == {"a"}
+    Path("trace.go").touch()
+    copy("in", "-o", "out/", "--resume")
+    assert outputs()["b"] == "WAITS"
+    assert traced("end") == [f"{v}.txt" for v in "abcde"]
+
+
 def test_no_more_jobs_are_out_than_the_pool_takes():
     out = []
 
