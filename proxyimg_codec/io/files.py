@@ -17,7 +17,9 @@ from ..errors import InputError, PxiError
 from .streams import (
     Readable,
     Writable,
+    is_readable,
     is_url,
+    is_writable,
     name_of,
     read_stream,
     read_url,
@@ -39,7 +41,7 @@ def read_bytes(path: Name | Readable) -> bytes:
         UnsupportedError: A URL needs a package that is not installed.
         UsageError: An open file gives text.
     """
-    if isinstance(path, Readable):
+    if is_readable(path):
         return read_stream(path)
     if is_url(path):
         return read_url(str(path))
@@ -52,7 +54,7 @@ def read_bytes(path: Name | Readable) -> bytes:
 
 
 def _name(path: Name | Readable, kind: str) -> str:
-    if isinstance(path, Readable):
+    if is_readable(path):
         return name_of(path)
     return f"standard {kind}" if os.fspath(path) == "-" else os.fspath(path)
 
@@ -97,7 +99,7 @@ def write_bytes(path: Name | Writable, data: bytes) -> None:
         UnsupportedError: A URL needs a package that is not installed.
         UsageError: An open file takes text.
     """
-    if isinstance(path, Writable):
+    if is_writable(path):
         write_stream(path, data)
         return
     place = write_url(str(path), data) if is_url(path) else path

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import os
 import re
-from typing import Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from ..errors import InputError, PxiError, UnsupportedError, UsageError
+
+if TYPE_CHECKING:
+    from typing_extensions import TypeIs
 
 _URL = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+(::[^/]*)?://")
 """Start of a URL, also of one that fsspec reads through another; a drive has but one letter."""
@@ -28,6 +31,20 @@ class Writable(Protocol):
     def write(self, data: Any, /) -> Any:
         """Writes bytes; returns how many, or None if that is all of them."""
         ...
+
+
+def is_readable(file: object) -> TypeIs[Readable]:
+    """Whether something is an open file to read from, and not a path with a method that reads."""
+    return isinstance(file, Readable) and _is_open(file)
+
+
+def is_writable(file: object) -> TypeIs[Writable]:
+    """Whether something is an open file to write to, and not a path with a method that writes."""
+    return isinstance(file, Writable) and _is_open(file)
+
+
+def _is_open(file: object) -> bool:
+    return not isinstance(file, str | os.PathLike) or hasattr(file, "close")
 
 
 def is_url(name: object) -> bool:

@@ -116,6 +116,22 @@ def test_open_files_are_written_where_they_are_and_stay_open():
     assert wrapped.got == image.to_bytes()
 
 
+def test_paths_that_can_be_read_are_paths_and_files_that_have_one_are_files(tmp_path):
+    class Path(type(tmp_path)):
+        def read(self):
+            raise AssertionError("it is a path")
+
+        write = read
+
+    pxi.open(SMALL).save(Path(tmp_path / "a.pxi"))
+    assert pxi.open(Path(tmp_path / "a.pxi")) == pxi.open(SMALL)
+    local = pytest.importorskip("fsspec").filesystem("file")
+    with local.open(str(tmp_path / "a.pxi")) as file:
+        file.seek(3)
+        with pytest.raises(pxi.FormatError, match="signature"):
+            pxi.open(file)
+
+
 def test_files_that_fail_say_which_and_how_far():
     with pytest.raises(pxi.InputError, match=r"far/away.pxi: cannot be read: Input/output error"):
         pxi.open(Failing(DATA))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from concurrent.futures import Future
 
 from ...errors import InputError, UnsupportedError
@@ -14,6 +15,9 @@ PATIENCE = 10
 class OnDask:
     """A cluster. Where a worker is lost, the scheduler gives its jobs to another.
 
+    It gives up a job with which several workers were lost, in turn, and with it those that waited
+    at the same workers; so each of these is tried again alone.
+
     Args:
         address: Address of the scheduler, such as ``tcp://10.0.0.1:8786``.
         jobs: Pictures at once; None for all threads of the cluster.
@@ -23,13 +27,15 @@ class OnDask:
         UnsupportedError: Dask is not installed.
     """
 
-    lone_retry = False
+    lone_retry = True
 
     def __init__(self, address: str, jobs: int | None) -> None:
         try:
             from distributed import Client
         except ImportError:
             raise UnsupportedError("--dask needs pip install 'proxyimg-codec[dask]'") from None
+        for handler in logging.getLogger("distributed").handlers:
+            handler.setLevel(logging.CRITICAL)  # tracebacks about what an error here says in a line
         try:
             self._client = Client(address, timeout=PATIENCE, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:

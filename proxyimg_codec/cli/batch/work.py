@@ -98,7 +98,9 @@ def _made(job: Job) -> tuple[str, dict[str, Any]]:
     """Makes an output, or finds that it is there: its state and report."""
     args = job.args
     output = str(args.output)
-    key = hashlib.sha256(f"{job.recipe} {_digest(args.input)}".encode()).hexdigest()
+    # What cannot be hashed, such as a URL, counts as another input in another batch.
+    content = _digest(args.input) or job.batch
+    key = hashlib.sha256(f"{job.recipe} {content}".encode()).hexdigest()
     old = records.read(job.out, output)
     exists = os.path.exists(output)
     # Whatever stands under the name of an output that was begun came of this tool.
@@ -118,12 +120,12 @@ def _made(job: Job) -> tuple[str, dict[str, Any]]:
     return MADE, report
 
 
-def _digest(path: str) -> str:
-    """Hash of a file or folder; something else if it cannot be read, about which others tell."""
+def _digest(path: str) -> str | None:
+    """Hash of a file or folder; None if it cannot be read, about which others tell."""
     try:
         return records.digest_of(path)
-    except OSError as error:
-        return f"unreadable: {error.errno}"
+    except OSError:
+        return None
 
 
 class _Notes(logging.Handler):

@@ -161,11 +161,15 @@ def test_a_picture_that_kills_its_process_is_named(texts, copy, traced):
     assert set(traced("end")) == {f"{v}.txt" for v in "acde"}
 
 
+def environment():
+    """Variables for a process that imports what this one does."""
+    return {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path])}
+
+
 def started(*words):
     """A batch in a process of its own."""
     command = [sys.executable, "-m", "tests.support.batches", *words]
-    env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path])}
-    return subprocess.Popen(command, env=env, stderr=subprocess.PIPE, text=True)
+    return subprocess.Popen(command, env=environment(), stderr=subprocess.PIPE, text=True)
 
 
 def until(found):

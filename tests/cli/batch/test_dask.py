@@ -2,21 +2,39 @@
 
 import shutil
 import socket
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
-from tests.cli.batch.test_batch import FIVE, outputs, states
+from tests.cli.batch.test_batch import FIVE, environment, outputs, started, states, until
 from tests.support.files import SMALL
 
+dask = pytest.importorskip("dask", reason="dask is not installed")
 distributed = pytest.importorskip("distributed", reason="distributed is not installed")
+
+
+CLUSTER = """
+import time
+from distributed import LocalCluster
+options = {"dashboard_address": ":0", "host": "127.0.0.1", "threads_per_worker": 1}
+if __name__ == "__main__":
+    with LocalCluster(n_workers=1, **options) as found:
+        print(found.scheduler_address, flush=True)
+        time.sleep(600)
+"""
 
 
 @pytest.fixture(scope="module")
 def cluster():
     """Address of a cluster of two processes."""
     options = {"dashboard_address": ":0", "host": "127.0.0.1", "scheduler_port": 0}
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, **options) as found:
+    patience = {"distributed.scheduler.allowed-failures": 1}
+    with (
+        dask.config.set(patience),
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, **options) as found,
+    ):
         yield found.scheduler_address
 
 
@@ -57,6 +75,28 @@ def test_tools_use_it(cluster, tool, here):
     assert {Path(f"out/{name}.png").read_bytes() for name in "abc"} == {want}
 
 
+@pytest.mark.slow
+def test_a_cluster_that_goes_is_named_and_what_is_made_stays(texts, copy, traced):
+    # Without a supervisor its workers end with the scheduler.
+    Path("cluster.py").write_text(CLUSTER)
+    command = [sys.executable, "cluster.py"]
+    texts(a="one", b="waits")
+    with subprocess.Popen(command, stdout=subprocess.PIPE, env=environment(), text=True) as found:
+        try:
+            trace = ("--trace", str(Path("trace").absolute()))
+            process = started("in", "-o", "out/", "--dask", found.stdout.readline().strip(), *trace)
+            until(lambda: traced("begin") == ["a.txt", "b.txt"])
+        finally:
+            found.kill()
+    err = process.communicate(timeout=60)[1]
+    assert process.returncode == 3
+    assert "Traceback" not in err
+    assert "pxi-test: the cluster is gone" in err.splitlines()[-1]
+    Path("trace.go").touch()
+    _, lines = copy("in", "-o", "out/", "--resume", *trace)
+    assert states(lines) == [("a", "same"), ("b", "made")]
+
+
 def test_a_cluster_that_is_not_there_is_named(texts, copy, monkeypatch):
     from proxyimg_codec.cli.batch import on_dask
 
@@ -71,12 +111,12 @@ def test_a_cluster_that_is_not_there_is_named(texts, copy, monkeypatch):
     assert not outputs()
 
 
-def test_a_cluster_without_workers_is_named(texts, copy, monkeypatch):
-    from proxyimg_codec.cli.batch import on_dask
+@pytest.mark.slow
+def test_a_cluster_without_workers_is_named(cluster, texts, copy, monkeypatch):
+    def nobody(client, count, timeout):
+        raise TimeoutError
 
-    monkeypatch.setattr(on_dask, "PATIENCE", 1)
-    options = {"dashboard_address": ":0", "host": "127.0.0.1", "scheduler_port": 0}
+    monkeypatch.setattr(distributed.Client, "wait_for_workers", nobody)
     texts(a="one", b="two")
-    with distributed.LocalCluster(n_workers=0, **options) as found:
-        err, _ = copy("in", "-o", "out/", "--dask", found.scheduler_address, code=3)
+    err, _ = copy("in", "-o", "out/", "--dask", cluster, code=3)
     assert "has no workers" in err
