@@ -47,6 +47,9 @@ def folder(tmp_path_factory):
     path = tmp_path_factory.mktemp("docs")
     raster.write(path / "photo.png", smooth(96, 64))
     raster.write(path / "without.png", smooth(96, 64)[::-1])
+    (path / "pictures" / "2026").mkdir(parents=True)
+    for name, size in (("1.png", (24, 17)), ("2026/2.png", (19, 23))):
+        raster.write(path / "pictures" / name, smooth(*size))
     (path / "masks" / "cat").mkdir(parents=True)
     mask = disc(96, 64)
     low = np.zeros_like(mask)
