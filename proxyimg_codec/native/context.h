@@ -4,6 +4,8 @@
 #include "laplace.h"
 #include "linear.h"
 
+namespace PXI_LEVEL {
+
 struct ContextNet {  // of one level: weights [out][in].., as in texture/registered_model.py
     const int32_t *first, *first_bias, *second, *second_bias, *causal, *mix, *mix_bias, *luma, *luma_bias,
         *from_luma, *from_luma_bias, *chroma, *chroma_bias;
@@ -245,3 +247,5 @@ class LevelCoder {
         return NOTHING;
     }
 };
+
+}  // namespace PXI_LEVEL

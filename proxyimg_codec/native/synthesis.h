@@ -3,6 +3,8 @@
 
 #include "linear.h"
 
+namespace PXI_LEVEL {
+
 struct Synthesis {  // of one level: weights [out][in].., as in texture/registered_model.py
     const float *linear, *first, *first_bias, *second, *second_bias, *third, *third_bias, *gain;
     int32_t hidden, height, width, rows, columns;  // rows is 2 height or 2 height - 1, and so on
@@ -144,3 +146,5 @@ class Synthesizer {
         }
     }
 };
+
+}  // namespace PXI_LEVEL
