@@ -8,6 +8,7 @@
 #include <new>
 
 #include "arrays.h"
+#include "completion.h"
 #include "context.h"
 #include "coverage.h"
 #include "level.h"
@@ -78,6 +79,26 @@ void PXI(coloured)(const float *planes, const float *colours, int64_t n, float *
 // Coverage of pixels; 0 where there are too many pieces, see `coverage`.
 int PXI(coverage)(Cover *to, const int64_t *segments, const int64_t *log2, int64_t n) {
     return coverage(*to, segments, log2, n);
+}
+
+// Fills the unknown values of a plane; see `Diffusion`.
+int PXI(diffused)(const Plane *plane, const uint8_t *done) {
+    try {
+        Diffusion().run(*plane, done);
+        return NOTHING;
+    } catch (const std::bad_alloc &) {
+        return NO_MEMORY;
+    }
+}
+
+// Completes a plane by references; see `complete`.
+int PXI(completed)(Copies *copies) {
+    try {
+        complete(*copies);
+        return NOTHING;
+    } catch (const std::bad_alloc &) {
+        return NO_MEMORY;
+    }
 }
 
 // Puts colours behind what is there; see `blend`.

@@ -81,6 +81,8 @@ _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "pxi_sample": (None, [_ADDRESS, _LONG, _INT, ct.POINTER(Points), _ADDRESS]),
     "pxi_coloured": (None, [_ADDRESS, _ADDRESS, _LONG, _ADDRESS]),
     "pxi_coverage": (ct.c_int, [ct.POINTER(Cover), _ADDRESS, _ADDRESS, _LONG]),
+    "pxi_diffused": (ct.c_int, [_ADDRESS, _ADDRESS]),
+    "pxi_completed": (ct.c_int, [_ADDRESS]),
     "pxi_blend": (None, [*(_ADDRESS,) * 4, _LONG]),
     "pxi_train": (ct.c_double, [*(_ADDRESS,) * 2, *(_LONG,) * 3, *(_ADDRESS,) * 2]),
 }  # fmt: skip
