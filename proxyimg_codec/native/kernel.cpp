@@ -12,6 +12,7 @@
 #include "context.h"
 #include "coverage.h"
 #include "level.h"
+#include "lifting.h"
 #include "network.h"
 #include "sample.h"
 #include "synthesis.h"
@@ -34,6 +35,16 @@ int64_t PXI(rans_encode)(const uint16_t *start, const uint16_t *freq, const int6
 int PXI(pyramid_level)(Level *level) {
     try {
         return LevelCoder(*level).run();
+    } catch (const std::bad_alloc &) {
+        return NO_MEMORY;
+    }
+}
+
+// Planes that bands give by the plain wavelet; what went wrong, if anything.
+int PXI(next_plain)(const Plain *planes) {
+    try {
+        Lifting(*planes).run();
+        return NOTHING;
     } catch (const std::bad_alloc &) {
         return NO_MEMORY;
     }

@@ -75,6 +75,7 @@ _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "pxi_rans_encode": (_LONG, [*(_ADDRESS,) * 3, _LONG, _INT, _INT, _ADDRESS, _ADDRESS]),
     "pxi_pyramid_level": (ct.c_int, [_ADDRESS]),
     "pxi_pyramid_synthesis": (ct.c_int, [_ADDRESS]),
+    "pxi_next_plain": (ct.c_int, [_ADDRESS]),
     "pxi_forward": (
         None, [ct.POINTER(Net), _ADDRESS, _ADDRESS, ct.POINTER(Entries), _LONG, _ADDRESS],
     ),

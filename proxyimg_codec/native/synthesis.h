@@ -1,6 +1,7 @@
 // The synthesis of the pyramid, texture/synthesis.py; numpy is its judge, within rounding.
 #pragma once
 
+#include "lifting.h"
 #include "linear.h"
 
 namespace PXI_LEVEL {
@@ -77,14 +78,6 @@ class Synthesizer {
         std::memcpy(to, &v, sizeof v);
     }
     static float soft(float x) { return x / (1 + std::abs(x) * .125f); }
-
-    // Index into a band of a line of `size` samples, mirrored about the first and the last of them.
-    static int mirrored(int i, int size, bool high) {
-        const int count = (size + 1 - high) / 2;
-        if (i < 0) i = -i - high;
-        if (i >= count) i = size - 1 - high - i;
-        return std::clamp(i, 0, std::max(count - 1, 0));
-    }
 
     // The last row of inputs.
     void read(int y) {
