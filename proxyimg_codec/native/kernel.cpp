@@ -11,6 +11,7 @@
 #include "completion.h"
 #include "context.h"
 #include "coverage.h"
+#include "finish.h"
 #include "level.h"
 #include "lifting.h"
 #include "network.h"
@@ -115,6 +116,19 @@ int PXI(completed)(Copies *copies) {
 // Puts colours behind what is there; see `blend`.
 void PXI(blend)(float *result, float *clear, const float *colour, const float *coverage, int64_t n) {
     blend(result, clear, colour, coverage, n);
+}
+
+// Colours of n outputs; see `premultiplied`.
+void PXI(premultiplied)(const float *output, int32_t channels, int64_t n, float *out) {
+    premultiplied(output, channels, n, out);
+}
+
+// Output samples of `bits` 8 or 16; see `finished`.
+void PXI(finished)(const float *samples, int32_t channels, int64_t n, int32_t components, int32_t bits, void *out) {
+    if (bits == 8)
+        finished(samples, channels, n, components, 255, (uint8_t *)out);
+    else
+        finished(samples, channels, n, components, 65535, (uint16_t *)out);
 }
 
 }  // extern "C"
