@@ -27,6 +27,36 @@ struct Level {
     int32_t *latents;        // [9][height][width], 0
 };
 
+struct Lowest {  // planes, decoded by ascending x + y
+    Tables tables;
+    Source source;
+    int32_t scales[3], count, height, width;
+    int32_t *out;  // [count][height][width], 0
+};
+
+inline Wrong decode_lowest(Lowest &s) {
+    Sink sink{};
+    LatentCoder coder{s.tables, s.source, sink};
+    const int h = s.height, w = s.width;
+    std::vector<Symbol> symbols;
+    for (int t = 0; t < h + w - 1; t++) {
+        const int first = std::max(t - w + 1, 0), last = std::min(t, h - 1);
+        symbols.clear();
+        for (int i = first; i <= last; i++)
+            for (int c = 0; c < s.count; c++) {
+                const int32_t *here = s.out + ((int64_t)c * h + i) * w + t - i;
+                const int up = i ? here[-w] : 0, left = t > i ? here[-1] : 0;
+                symbols.push_back(coder.located((i && t > i ? 8 : 16) * (up + left), s.scales[c]));
+            }
+        if (const Wrong wrong = coder.decode(symbols)) return wrong;
+        const Symbol *next = symbols.data();
+        for (int i = first; i <= last; i++)
+            for (int c = 0; c < s.count; c++, next++)
+                s.out[((int64_t)c * h + i) * w + t - i] = next->row < 0 ? 0 : (int32_t)next->value;
+    }
+    return NOTHING;
+}
+
 typedef Linear<Whole, 2> Layer;
 typedef Layer::Sums Sums;
 typedef int16_t shorts __attribute__((vector_size(2 * LANES)));

@@ -32,6 +32,15 @@ int64_t PXI(rans_encode)(const uint16_t *start, const uint16_t *freq, const int6
     return rans_encode(start, freq, ends, groups, scale_bits, lanes, states, words);
 }
 
+// Decodes the lowest planes of a pyramid; what went wrong, if anything.
+int PXI(pyramid_lowest)(Lowest *planes) {
+    try {
+        return decode_lowest(*planes);
+    } catch (const std::bad_alloc &) {
+        return NO_MEMORY;
+    }
+}
+
 // Codes a level of a pyramid; what went wrong, if anything.
 int PXI(pyramid_level)(Level *level) {
     try {

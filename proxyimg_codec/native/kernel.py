@@ -73,6 +73,7 @@ _ADDRESS, _INT, _LONG = ct.c_void_p, ct.c_int32, ct.c_int64
 _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "pxi_decode": (_LONG, [ct.POINTER(Coded)]),
     "pxi_rans_encode": (_LONG, [*(_ADDRESS,) * 3, _LONG, _INT, _INT, _ADDRESS, _ADDRESS]),
+    "pxi_pyramid_lowest": (ct.c_int, [_ADDRESS]),
     "pxi_pyramid_level": (ct.c_int, [_ADDRESS]),
     "pxi_pyramid_synthesis": (ct.c_int, [_ADDRESS]),
     "pxi_next_plain": (ct.c_int, [_ADDRESS]),

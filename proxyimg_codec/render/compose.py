@@ -157,8 +157,11 @@ class _Painter:
 
     def paint(self, sheet: Sheet, box: Rectangle, at: NDArray[np.int64]) -> None:
         """Computes colours of samples of a sheet; `at` are their numbers, from `sheet.start` on."""
-        everything = len(at) == len(sheet.known)
-        sheet.colour[slice(None) if everything else at] = self._textured(box, at + sheet.start)
+        colour = self._textured(box, at + sheet.start)
+        if len(at) == len(sheet.known):
+            sheet.colour = colour
+        else:
+            sheet.colour[at] = colour
         sheet.known[at] = True
 
     def posed(self, colour: Floats) -> Floats:
