@@ -30,13 +30,20 @@ class _Parser(argparse.ArgumentParser):
         super().error(printable(message))
 
 
-def parser(prog: str, description: str) -> argparse.ArgumentParser:
-    """Creates an argument parser in the style of all tools."""
+def parser(prog: str, description: str, *about: str) -> argparse.ArgumentParser:
+    """Creates an argument parser in the style of all tools.
+
+    Args:
+        prog: Name of the tool.
+        description: What it does.
+        about: More lines that ``--version`` prints.
+    """
     p = _Parser(
         prog, description=description, epilog=EXIT_CODES,
         formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False,
     )  # fmt: skip
-    p.add_argument("--version", action="version", version=f"{prog} {__version__}")
+    version = "\n".join((f"{prog} {__version__}", *about)).replace("%", "%%")
+    p.add_argument("--version", action="version", version=version)
     return p
 
 

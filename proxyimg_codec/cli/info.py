@@ -13,6 +13,7 @@ from ..container.chunks import VERSION
 from ..container.content import Container
 from ..container.file import parse
 from ..io.files import naming, read_bytes
+from ..native import levels
 from .common import add_limits, limits_of, parser, printable, run
 
 CODERS = {texr.IMPLICIT: "implicit", texr.PYRAMID: "pyramid"}
@@ -27,7 +28,7 @@ SAMPLINGS = ("direct", "node", "node, local only", "node, global only")
 
 def arguments() -> argparse.ArgumentParser:
     """Parser of the command line."""
-    p = parser("pxi-info", "Describe a .pxi file.")
+    p = parser("pxi-info", "Describe a .pxi file.", str(levels.chosen()))
     p.add_argument("input", metavar="IN", help=".pxi file, or - for standard input")
     add_limits(p)
     p.add_argument("--json", action="store_true", help="print JSON")

@@ -121,6 +121,8 @@ def _code_lowest(
     coder: context.Coder, fields: Mapping[str, Any], shape: tuple[int, int], values: Latents | None
 ) -> Ints:
     """Codes the lowest planes by ascending x + y, each value predicted from above and left."""
+    if isinstance(coder, Decoder) and kernel.available():
+        return coder.lowest(fields["lowest"], shape)
     h, w = shape
     scale = np.array(fields["lowest"], np.int64)
     count = len(scale)
@@ -252,6 +254,17 @@ class Decoder:
             raise FormatError(context.BAD_LATENT, rule="PYR-12")
         out[there] = off
         return out
+
+    def lowest(self, scales: list[int], shape: tuple[int, int]) -> Ints:
+        """Reads the lowest planes with the compiled kernel: int32 [3, h, w].
+
+        Raises:
+            FormatError: The stream is corrupt.
+        """
+        planes, self._at = context_native.decode_lowest(
+            scales, shape, self._stream, self._escapes, self._at
+        )
+        return planes
 
     def level(self, at: context_native.Place, values: Ints | None) -> Ints:
         """Reads a whole level with the compiled kernel; `values` is ignored.

@@ -359,6 +359,8 @@ def _smooth(covered: NDArray[np.int32]) -> NDArray[np.int64]:
 
 def _eroded(samples: Samples, reach: int | None = None) -> Samples:
     """Mask eroded across and down, by default by `REACH`; True beyond the array."""
+    if samples.all():
+        return samples
     reach = REACH if reach is None else reach
     for axis, size in enumerate(samples.shape):
         beside = [(reach, reach) if k == axis else (0, 0) for k in (0, 1)]

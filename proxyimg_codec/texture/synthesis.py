@@ -67,6 +67,8 @@ def samples(model: Model, grid: Grid, latents: Sequence[Ints], lowest: Ints, ste
         weights = model.synthesis[min(number, len(model.synthesis)) - 1]
         out = _finer(weights, out, latents[number - 1], step, grid.at(number - 1))
     colours = model.to_colour.floats * np.float32(2 ** (step / 64))
+    if kernel.available():
+        return kernel.coloured(out, colours)
     for top, bottom in strips(*out.shape[:2]):
         out[top:bottom] = out[top:bottom] @ colours.T + 128
     return out
@@ -77,7 +79,9 @@ def _finer(
 ) -> Floats:
     """Next finer planes float32 [*shape, 3] from planes [h, w, 3] and latents [9, h, w]."""
     t = np.float32((step - STEP_ORIGIN) / 128)
-    gain = np.exp(weights.gain.floats + weights.gain_by_step.floats * t)
+    # In double precision, so that all machines round it to the same numbers.
+    gain = np.exp(weights.gain.floats + weights.gain_by_step.floats * t, dtype=np.float64)
+    gain = gain.astype(np.float32)
     bias = weights.first_bias.floats + weights.first_by_step.floats * t
     linear = (wavelet() + weights.delta.floats).astype(np.float32)
     if kernel.available():
