@@ -26,7 +26,7 @@ EDGE = 16
 
 
 class Soft(NamedTuple):
-    """What a soft layer has of its own.
+    """Samples and rasters that a soft layer has of its own.
 
     Attributes:
         samples: bool [h, w], True for the samples of its view that are soft.
