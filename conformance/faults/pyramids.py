@@ -195,6 +195,10 @@ def _bare_alone(self: Occlusion, moved: Moved) -> Any:
     return loose_of(self, moved) if self.own is None else self._bared(moved)
 
 
+def _never_apart(*args: Any) -> Moved:
+    return neighbour_of(*args)._replace(apart=False)
+
+
 def _soft_where_bare(self: PyramidTexture, moved: Moved) -> Any:
     """Soft samples that layers in front hid show as if they were opaque."""
     kept = kept_of(self, moved)
@@ -244,6 +248,7 @@ position_of, samples_of = pyramid._position, PyramidTexture._samples
 unpack_of, premultiplied_of = pyramid.unpack, compose.premultiplied
 moved_of, known_of = Occlusion.moved, PyramidTexture._known
 still_of, neighbours_of = Pose.still, neighbours.moved_neighbours
+neighbour_of = neighbours._moved
 loose_of, kept_of = Occlusion.loose, PyramidTexture.kept
 copies_of, weights_of, bases_of = completion.unpack, completion._weights, completion._bases
 
@@ -309,6 +314,7 @@ _FAULTS: dict[str, list[Patch]] = {
     "mattes-at-rest": [(Occlusion, "loose", lambda self, moved: np.ones(self.box[:1:-1], bool)),
         (PyramidTexture, "shown", property(lambda self: self._present & ~self.soft))],
     "mattes-without-reach": [(Occlusion, "loose", _bare_alone)],
+    "mattes-over-what-was-there": [(neighbours, "_moved", _never_apart)],
     "mattes-of-moved-layers-alone": [(PyramidTexture, "kept", _soft_where_bare)],
     "soft-layers-hide": [(Occlusion, "moved", lambda self, *of: moved_of(self, *of[:3]))],
     "trusts-soft-samples": [(PyramidTexture, "_known", _trusting)],

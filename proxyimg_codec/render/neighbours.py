@@ -81,7 +81,9 @@ def _moved(layer: Layer, layers: Sequence[Layer], home: int, drawn: frozenset[La
     ]
     views = ((k, v.texture) for k, v in enumerate(layers))
     soft = frozenset(k for k, t in views if isinstance(t, PyramidTexture) and t.matte)
-    return view.cuts.moved(home, [v.boundary for v in layers], still, soft)
+    found = view.cuts.moved(home, [v.boundary for v in layers], still, soft)
+    behind = zip(layers[: layers.index(layer)], still, strict=False)
+    return found._replace(apart=bool(view.matte) and any(v in drawn and not s for v, s in behind))
 
 
 def _place(texture: Texture, box: Box) -> tuple[Planes, int, int] | None:

@@ -37,10 +37,13 @@ class Moved(NamedTuple):
         fronts: Boundaries among `Occlusion.fronts` that have moved or are gone.
         behind: Layers behind, front to back: the boundary at rest, None for the whole canvas, and
             whether it still rests in its place. Empty if all do.
+        apart: Whether the view has a matte, and something that may shine through has come to lie
+            behind its layer.
     """
 
     fronts: frozenset[Boundary] = frozenset()
     behind: tuple[tuple[Boundary | None, bool], ...] = ()
+    apart: bool = False
 
 
 class Edge(NamedTuple):
@@ -257,9 +260,9 @@ class Occlusion:
     def loose(self, moved: Moved) -> Samples:
         """Samples near others behind which something has changed, bool [height, width] [PYR-53].
 
-        Without a boundary of the layer itself that cuts the view, these are all.
+        These are all if no boundary of the layer itself cuts the view, or one moved behind it.
         """
-        if self.own is None:
+        if self.own is None or moved.apart:
             return np.ones(self.box[:1:-1], np.bool_)
         return ~_eroded(~self._bared(moved))
 

@@ -148,6 +148,7 @@ CAUGHT = {
     "ignores-mattes": ("matte", "pixels", "behind"),
     "mattes-at-rest": ("matte", "pixels", "matte-all"),
     "mattes-without-reach": ("matte-between", "pixels", "matte-all"),
+    "mattes-over-what-was-there": ("matte-over", "pixels", "matte-all"),
     "mattes-of-moved-layers-alone": ("matte-bared", "pixels", "matte-all"),
     "soft-layers-hide": ("matte-between", "pixels", "matte-all"),
     "trusts-soft-samples": ("matte-moved", "pixels", "behind"),

@@ -134,18 +134,60 @@ def test_edits_keep_the_matte(soft):
 
 
 def test_where_nothing_has_changed_behind_a_rim_it_stays(soft):
-    """A small layer behind one side of the ball is removed; the other side is as before."""
+    """A layer behind one side of the ball is hidden; the other side is as before."""
     alpha, ball, ground = scene()
     spot = np.hypot(*(np.mgrid[:ROWS, :COLUMNS] - np.array([44, 74])[:, None, None])) < 11
     ground = np.where(spot[..., None], np.float32(0.9), ground)
     pixels = np.rint(255 * over(alpha, ball, ground)).astype(np.uint8)
     image = pxi.encode(pixels, masks={"spot": spot, "ball": alpha}, effort=1, quality=75)
-    before, after = image.render(), image.layers["spot"].moved(35, 30).render()
+    before, after = image.render(), image.layers["spot"].hidden().render()
     far = np.ones(alpha.shape, bool)
     far[30:] = False
     far[:, :45] = True
     np.testing.assert_array_equal(after[far], before[far])
     assert (after[36:52, 62:68] != before[36:52, 62:68]).any()
+
+
+def test_textures_that_change_hands(soft, tmp_path):
+    alpha = alone(soft)[1]
+    file = str(tmp_path / "plain.png")
+    paint = np.full((50, 83, 3), (40, 200, 90), np.uint8)
+    paint[25:] += 4
+    cv2.imwrite(file, paint)
+    green = pxi.from_bytes(soft.layers["ball"].textured(file).to_bytes())
+    colour, found = alone(green)
+    assert np.abs(found - alpha).mean() < 0.006
+    assert np.abs(colour - alpha[..., None] * np.float32([90, 200, 40]) / 255).mean() < 0.02
+    two = soft.layers["ball"].duplicated("two").layers["two"].textured(file)
+    lent = two.edited({"op": "texture", "layer": "back", "source": "ball"})
+    seen = lent.render(layers=["back"], dtype=np.float32)
+    assert seen.shape[2] == 3 or seen[..., 3].min() == 1
+    assert (seen[..., 0] > seen[..., 2]).all()  # as red as the ball, without the blue ground
+
+
+def test_what_was_removed_leaves_nothing_in_a_rim():
+    alpha, ball, ground = scene()
+    spot = np.hypot(*(np.mgrid[:ROWS, :COLUMNS] - np.array([44, 74])[:, None, None])) < 14
+    mixed = np.where(spot[..., None], np.float32([1, 1, 0.1]), ground)
+    pixels = np.rint(255 * over(alpha, ball, mixed)).astype(np.uint8)
+    image = pxi.encode(pixels, masks={"spot": spot, "ball": alpha}, effort=1, quality=75)
+    rim = spot & (alpha > 0.02) & (alpha < 0.6)
+    for gone in (image.layers["spot"].hidden(), image.layers["spot"].removed()):
+        seen = pxi.from_bytes(gone.to_bytes()).render(dtype=np.float32)
+        assert np.abs(seen - over(alpha, ball, ground))[rim].mean() < 0.04
+    assert np.abs(over(alpha, ball, mixed) - over(alpha, ball, ground))[rim].mean() > 0.15
+
+
+def test_what_comes_to_lie_behind_a_rim_shines_through(soft):
+    """A copy of the ball is moved behind it; and what was there is removed."""
+    alpha = alone(soft)[1]
+    both = soft.layers["ball"].duplicated("two").layers["two"].moved(25, 0)
+    both = both.layers["two"].reordered(1)
+    colour, behind = alone(soft)[0], np.roll(alpha, 25, 1)
+    ground = over(behind, np.roll(scene()[1], 25, 1), scene()[2])
+    seen = both.render(dtype=np.float32)
+    wanted = colour + (1 - alpha[..., None]) * ground
+    assert np.abs(seen - wanted)[(alpha > 0.02) & (alpha < 0.98)].mean() < 0.02
 
 
 def test_the_matte_of_hard_masks_is_found():

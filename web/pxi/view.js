@@ -56,7 +56,8 @@ function masksOf(scene, n, k) {
   const { part } = scene.textures[k];
   const [, , w, h] = part;
   const all = new Uint8Array(w * h).fill(1);
-  const still = found.lost ? far(found.lost, w, h) : new Uint8Array(w * h);
+  const apart = scene.drawn.some((b) => b < n && !rest(scene, n, k, b));
+  const still = found.lost && !apart ? far(found.lost, w, h) : new Uint8Array(w * h);
   const shown = (found.shown ?? all).map((v, i) => v & (!soft[i] || still[i]));
   const trusted = (found.trusted ?? all).map((v, i) => v & !soft[i]);
   return { ...found, shown, trusted, soft };

@@ -9,7 +9,7 @@ from proxyimg_codec.geometry.pose import Pose
 from proxyimg_codec.model import Layers, Picture
 from proxyimg_codec.texture.pyramid import PyramidTexture
 
-from ..builders import SIZE, Numbers
+from ..builders import SIZE, Numbers, ellipse, layer
 from ..registry import WHOLE, Valids
 from .behind import references
 from .meshes import CLOSE
@@ -67,6 +67,16 @@ def _matte_two(n: Numbers) -> Picture:
     bar = next(v for v in made.layers if v.name == "bar")
     copy = replace(made.layers[-1], texture=bar.texture)
     return replace(made, layers=Layers([*made.layers[:-1], copy]))
+
+
+@_case("A layer comes to lie behind the rim of a soft one, whose own back rests", "pyramid: matte",
+       "pyramid: moved")  # fmt: skip
+def _matte_over(n: Numbers) -> Picture:
+    made = softened(n, pieces(n, {}), "bar")
+    back, disc, bar = made.layers
+    square = layer("square", (0, 0, 9, 8), view(coded(n, (9, 8))), ellipse((4, 4), (4, 4)),
+                   pose=Pose(shift=(20 * 1024, 9 * 1024)))  # fmt: skip
+    return replace(made, layers=Layers([back, disc, square, bar]))
 
 
 @_case("A soft layer that rests hides nothing of what has changed behind it", "pyramid: matte",
