@@ -71,17 +71,19 @@ def _balanced(
     rest = 1 - alpha
     total = sum(ties)
     first, both, last = known * alpha**2 + total, known * alpha * rest, known * rest**2 + total
-    scale = (1 / np.maximum(first * last - both**2, 1e-12))[..., None]
-    even = np.indices(alpha.shape).sum(0) % 2 == 0
-    for turn in range(2 * rounds):
-        there = (even if turn % 2 == 0 else ~even)[..., None]
-        a = (known * alpha)[..., None] * picture
-        b = (known * rest)[..., None] * picture
-        for k, tie in enumerate(ties):
-            a = a + tie[..., None] * beside(own, k)
-            b = b + tie[..., None] * beside(behind, k)
-        new = scale * (last[..., None] * a - both[..., None] * b)
-        other = scale * (first[..., None] * b - both[..., None] * a)
-        own = np.where(there, np.clip(new, 0, 1), own).astype(np.float32)
-        behind = np.where(there, np.clip(other, 0, 1), behind).astype(np.float32)
-    return own, behind
+    scale = 1 / np.maximum(first * last - both**2, 1e-12)
+    even = (np.arange(height)[:, None] + np.arange(width)) % 2 == 0
+    out = np.empty((2, *picture.shape), np.float32)
+    for c in range(picture.shape[2]):
+        one, other, colour = own[..., c], behind[..., c], known * picture[..., c]
+        for turn in range(2 * rounds):
+            a, b = alpha * colour, rest * colour
+            for k, tie in enumerate(ties):
+                a += tie * beside(one, k)
+                b += tie * beside(other, k)
+            there = even if turn % 2 == 0 else ~even
+            new = np.where(there, np.clip(scale * (last * a - both * b), 0, 1), one)
+            other = np.where(there, np.clip(scale * (first * b - both * a), 0, 1), other)
+            one = new
+        out[0, ..., c], out[1, ..., c] = one, other
+    return out[0], out[1]
