@@ -38,6 +38,9 @@ def test_old_files_decode_as_ever(file):
         "0.10/edited",
         "0.10/moves-loop",
         "0.10/cuts-moved",
+        "0.11/edited",
+        "0.11/cuts-filled",
+        "0.11/copies-many",
     ],
 )
 def test_old_files_are_saved_as_new_ones_with_the_same_pixels(name):
@@ -56,6 +59,7 @@ def test_old_files_are_saved_as_new_ones_with_the_same_pixels(name):
         ("0.3/edited", 3, "0.3/start"),
         ("0.9/edited", 2, "0.9/start"),
         ("0.10/edited", 2, "0.10/start"),
+        ("0.11/edited", 2, "0.11/start"),
     ],
 )
 def test_old_histories_lead_back(edited, edits, start):

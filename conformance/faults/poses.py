@@ -186,7 +186,7 @@ FAULTS: dict[str, list[Patch]] = {
     "follows-parents": [(read, "from_bytes", _following_parents)],
     "believes-histories": [(undo, "digest", lambda *_: Anything())],
     "accepts-contradictions": [(check, "check", lambda *a: None)],
-    "reads-only-0.11": [(chunks, "READABLE", (chunks.VERSION,))],
+    "reads-only-0.12": [(chunks, "READABLE", (chunks.VERSION,))],
     "reads-the-future": [(chunks, "READABLE", tuple((0, k) for k in range(1, 20)))],
     "accepts-idle-poses": [(Pose, "at_rest", False)],
 }  # fmt: skip

@@ -102,6 +102,9 @@ def _add_decomposition(p: argparse.ArgumentParser) -> None:
         "inpaints: an ONNX file, or a name of pxi-models")  # fmt: skip
     add("--behind", metavar="FILE", help="the picture without its objects, of the same size: what "
         "the back layer shows where they were; pyramid")  # fmt: skip
+    add("--matte", choices=["auto", "hard", "soft"], help="soft masks, as of hair: "
+        "auto keeps their alpha where they have soft rims (default), hard cuts them at one half, "
+        "soft also finds that of hard masks by the colours along outlines; pyramid")  # fmt: skip
     add("--mesh", metavar="NAME", help="who makes proxy nodes: delaunay (default with texture "
         "implicit), triwild, ftetwild, or none (default with pyramid: edits make "
         "them)")  # fmt: skip

@@ -11,7 +11,9 @@ from typing import Any
 
 from .prompt_flags import FLAGS
 
-DECOMPOSITION = ("masks", *FLAGS, "layers", "max_layers", "segmenter", "depth", "frame", "tone")
+DECOMPOSITION = (
+    "masks", *FLAGS, "layers", "max_layers", "segmenter", "depth", "matte", "frame", "tone",
+)  # fmt: skip
 """Flags that make layers of a flat picture, or choose one of several."""
 
 

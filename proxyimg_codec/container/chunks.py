@@ -18,10 +18,10 @@ from ..errors import FormatError, UnsupportedError
 from ..limits import Budget
 
 SIGNATURE = b"\x89PXI\r\n\x1a\n"
-VERSION = (0, 11)
+VERSION = (0, 12)
 """Version of the format, major and minor, that is written."""
 
-READABLE = ((0, 1), (0, 2), (0, 3), (0, 9), (0, 10), VERSION)
+READABLE = ((0, 1), (0, 2), (0, 3), (0, 9), (0, 10), (0, 11), VERSION)
 """Versions of the format that are read; chapter 16 of the specification says how they differ."""
 
 MAPS_UNTIL = (0, 3)

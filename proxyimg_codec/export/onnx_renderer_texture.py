@@ -12,9 +12,10 @@ from ..geometry.pose import COLOUR_BITS, OPACITY_MAX, Pose
 from ..model import Layer, Picture
 from ..render.neighbours import moved_neighbours
 from ..texture import diffusion, node_sampling
+from ..texture.cubic import TAPS
 from ..texture.implicit import ImplicitTexture
 from ..texture.network import Floats
-from ..texture.pyramid import TAPS, PyramidTexture
+from ..texture.pyramid import PyramidTexture
 from .onnx_graph import Graph, Value
 from .onnx_network import forward
 from .onnx_renderer_warp import Shown

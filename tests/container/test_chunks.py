@@ -71,7 +71,7 @@ def test_bad_type_is_refused():
 def test_other_versions_are_unsupported_not_invalid():
     data = bytearray(FILE)
     data[8] = 1
-    with pytest.raises(UnsupportedError, match=r"1\.11"):
+    with pytest.raises(UnsupportedError, match=r"1\.12"):
         read(bytes(data))
 
 
@@ -87,7 +87,8 @@ def test_other_versions_are_unsupported_not_invalid():
         (9, True),
         (10, True),
         (11, True),
-        (12, False),
+        (12, True),
+        (13, False),
     ],
 )
 def test_known_versions_are_read(minor, known):
@@ -98,7 +99,7 @@ def test_known_versions_are_read(minor, known):
         return
     with pytest.raises(
         UnsupportedError,
-        match=rf"0\.{minor}, this program reads 0\.1, 0\.2, 0\.3, 0\.9, 0\.10, 0\.11;",
+        match=rf"0\.{minor}, this program reads 0\.1, 0\.2, 0\.3, 0\.9, 0\.10, 0\.11, 0\.12;",
     ):
         read(bytes(data))
 

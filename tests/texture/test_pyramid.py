@@ -3,7 +3,7 @@ import pytest
 
 from proxyimg_codec.entropy import arrays
 from proxyimg_codec.errors import FormatError
-from proxyimg_codec.texture import pyramid
+from proxyimg_codec.texture import cubic
 from proxyimg_codec.texture.diffusion import diffused
 from proxyimg_codec.texture.pyramid import FILL_ONE, PyramidTexture, unpack
 from tests.support.pyramids import filled, planes, raster, view
@@ -88,7 +88,7 @@ def test_chunks_do_not_show(source, monkeypatch):
     texture = view(source, part=PART)
     x, y = centres(PART)
     whole = texture.sample(x + 0.2, y - 0.4, PART)
-    monkeypatch.setattr(pyramid, "CHUNK", 37)
+    monkeypatch.setattr(cubic, "CHUNK", 37)
     np.testing.assert_array_equal(texture.sample(x + 0.2, y - 0.4, PART), whole)
 
 

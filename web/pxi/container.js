@@ -23,7 +23,7 @@ export function readChunks(data, limits) {
   limits.spend("file_bytes", data.length);
   need(data.length >= 12, "the file is shorter than its prefix");
   need(SIGNATURE.every((byte, i) => data[i] === byte), "this is not a .pxi file");
-  supported(data[8] === 0 && [1, 2, 3, 9, 10, 11].includes(data[9]), `version ${data[8]}.${data[9]}`);
+  supported(data[8] === 0 && [1, 2, 3, 9, 10, 11, 12].includes(data[9]), `version ${data[8]}.${data[9]}`);
   need(data[10] === 0 && data[11] === 0, "the reserved field is not 0");
   const view = new DataView(data.buffer, data.byteOffset, data.byteLength);
   const chunks = [];

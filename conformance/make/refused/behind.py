@@ -149,7 +149,7 @@ _BEHIND: list[Row] = [
      lambda b: b.set(DISC_TEXR, cell=0, mask=b"", sources=_sources(0))),
     ("invalid-few-sources", "sources of a stream that is too low", "PYR-48",
      lambda b: b.set(DISC_TEXR, sources=bytes(9))),
-    ("invalid-seven-values", "textures as of version 0.10", "CON-19", _versions((0, 11), 7)),
+    ("invalid-seven-values", "textures as of version 0.10", "CON-19", _versions((0, 12), 7)),
     ("invalid-twelve-values", "textures as of version 0.11 in a file of version 0.10", "CON-19",
      _versions((0, 10), 12)),
 ]

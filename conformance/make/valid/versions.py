@@ -7,7 +7,7 @@ from dataclasses import replace
 import msgpack
 
 from proxyimg_codec.codec.write import to_bytes
-from proxyimg_codec.container.chunks import read, write
+from proxyimg_codec.container.chunks import Chunk, read, write
 from proxyimg_codec.geometry.pose import Pose
 
 from ..builders import (
@@ -51,11 +51,22 @@ def _version_0_9(n: Numbers) -> bytes:
        "pyramid: cuts")  # fmt: skip
 def _version_0_10(n: Numbers) -> bytes:
     """With what was possible in it alone."""
-    chunks = [
-        replace(c, payload=msgpack.packb(msgpack.unpackb(c.payload)[:7])) if c.type == "TEXR" else c
+    return write(_shortened(n, 7), (0, 10))
+
+
+def _shortened(n: Numbers, count: int) -> list[Chunk]:
+    """Chunks of a picture whose pyramid textures have the first `count` values."""
+    return [
+        replace(c, payload=msgpack.packb(msgpack.unpackb(c.payload)[:count]))
+        if c.type == "TEXR" else c
         for c in read(to_bytes(pieces(n, {"disc": Pose(shift=(3 * 1024, -900))})))
-    ]
-    return write(chunks, (0, 10))
+    ]  # fmt: skip
+
+
+@_case("A file of version 0.11, whose pyramid textures end with unmix", "file: version", "CON-19",
+       "pyramid: cuts")  # fmt: skip
+def _version_0_11(n: Numbers) -> bytes:
+    return write(_shortened(n, 13), (0, 11))
 
 
 @_case("A file of version 0.2 with arrays", "file: version", "fields: maps")

@@ -15,13 +15,17 @@ OPAQUE = 0.99
 """Least alpha of samples that are copied."""
 
 
-def copies_of(picture: Floats, cuts: Occlusion | None, settings: Settings) -> Copies | None:
+def copies_of(
+    picture: Floats, cuts: Occlusion | None, settings: Settings, soft: Samples | None = None
+) -> Copies | None:
     """Chooses what the hidden samples of a view copy: those of its own shape that others cover.
 
     Args:
         picture: float32 [H, W, 4] in 0..1 with straight alpha.
         cuts: Cuts of the view; None if nothing cuts it.
         settings: Settings of the encoder, for `background` and the seed.
+        soft: bool [height, width], True for samples of the view that have a matte, and so colours
+            of their own; or None.
 
     Returns:
         The references, or None if a smooth fill is wanted or as good, or nothing can be copied.
@@ -31,6 +35,8 @@ def copies_of(picture: Floats, cuts: Occlusion | None, settings: Settings) -> Co
     x, y, width, height = cuts.box
     part = picture[y : y + height, x : x + width]
     known, wanted = hidden_in(cuts)
+    if soft is not None:
+        known, wanted = known & ~soft, wanted & ~soft
     colours = np.ascontiguousarray(part[..., :3] * np.float32(255))
     always = settings.background == "exemplar"
     return references(colours, known & (part[..., 3] >= OPAQUE), wanted, settings.seed, always)
@@ -50,7 +56,7 @@ def copies_of_texture(texture: PyramidTexture) -> Copies | None:
     else:
         assert texture.shown is not None, "nothing is hidden"
         trusted, wanted = texture.shown, ~texture.shown
-    values, known = texture.known(trusted)
+    values, known = texture.known(trusted & ~texture.soft)
     samples = np.moveaxis(values, 0, 2) / np.float32(FILL_ONE)
     colours = samples[..., :-1] if texture.alpha is not None else samples
     alpha = samples[..., -1] if texture.alpha is not None else np.ones(known.shape)
