@@ -120,7 +120,8 @@ def made(
     size: int = 256, **more: Any,
 ) -> bytes:  # fmt: skip
     """Bytes of a file."""
-    head = {"size": [size, size], "channels": 3, "opaque": 0, "depth": 8}
+    channels = 4 if any(texture.get("matte") for texture in textures) else 3
+    head = {"size": [size, size], "channels": channels, "opaque": 0, "depth": 8}
     head |= {"layers": len(layers), "networks": len(networks)}
     return file.serialize(Container(head, tuple(layers), tuple(networks), tuple(textures), **more))
 
@@ -472,6 +473,18 @@ def copies() -> bytes:
     copied = view(width, height, grain=6, offsets=[64, 0], sources=_ones(1, 32, 64), **masked)
     behind = plan(width, height) | {"cell": 7, "support": _halves(16, 32)}
     return made([layer()], [copied], planes=(plan(width, height), behind))
+
+
+@bomb
+def mattes() -> bytes:
+    """Soft layers over each other, of which every other sample is soft."""
+    side, count = 1024, 4
+    soft = {"cell": 2, "support": _halves(256, 256), "components": 1, "grey": 3, "lowest": [0]}
+    rasters = plan(side, side), plan(side, side), plan(side, side) | soft
+    return made(
+        [layer(k) for k in range(count)], [view(side, side, behind=2, matte=3)] * count,
+        planes=rasters,
+    )  # fmt: skip
 
 
 def _ones(channels: int, rows: int, columns: int) -> bytes:

@@ -9,10 +9,9 @@ copy=$(mktemp -d)
 trap 'rm -rf "$copy"' EXIT
 git ls-files -z | tar --null --create --files-from=- | tar --extract --directory="$copy"
 cd "$copy"
-suffix=$("$python" -c 'import sysconfig; print(sysconfig.get_config_var("EXT_SUFFIX"))')
 ${CXX:-g++} -shared -fPIC -std=c++20 -O1 -g -fno-omit-frame-pointer -pthread \
     -fsanitize=address,undefined -fno-sanitize-recover=undefined \
-    proxyimg_codec/native/kernel.cpp -o "proxyimg_codec/native/_kernel$suffix"
+    proxyimg_codec/native/*.cpp -o proxyimg_codec/native/_kernel.so
 library() { "${CXX:-g++}" -print-file-name="$1"; }
 ASAN_OPTIONS=detect_leaks=0 \
     LD_PRELOAD="$(library libasan.so) $(library libubsan.so) $(library libstdc++.so)" \

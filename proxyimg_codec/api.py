@@ -7,10 +7,11 @@ functions of the lower modules.
 
 from __future__ import annotations
 
-import os
+import operator
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from pickle import PickleBuffer
+from typing import TYPE_CHECKING, Any, SupportsIndex
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,9 @@ from .container.chunks import Chunk
 from .edit.methods import Editable, EditableImage
 from .errors import UnsupportedError
 from .handles import LayerHandle, MadeOnce, PictureHandle
-from .io.files import write_atomically
+from .hosted import Hosted
+from .io.files import Name, write_bytes
+from .io.streams import Readable, Writable
 from .limits import DEFAULT_LIMITS, Limits
 from .model import Layers, Pictured
 from .render import pixels
@@ -29,14 +32,18 @@ from .render.cache import Cache
 from .render.moment import at, displacements
 
 if TYPE_CHECKING:
+    from typing_extensions import Buffer
+
     from .animate.motion import Motion
     from .encoder.encode import Progress
     from .encoder.settings import Settings
     from .encoder.shapes.mask_arrays import Masks
 
 
-class Image(PictureHandle, EditableImage):
+class Image(PictureHandle, EditableImage, Hosted):
     """A `.pxi` picture in memory. Images are equal if their files are, and are pickled as files.
+
+    ``np.asarray(image)`` are the pixels that `render` gives, and notebooks show them.
 
     Args:
         picture: The picture as data, or another handle to it.
@@ -70,12 +77,17 @@ class Image(PictureHandle, EditableImage):
     def __hash__(self) -> int:
         return hash((self._picture.size, tuple(v.name for v in self._picture.layers)))
 
-    def __reduce__(self) -> tuple[Callable[..., Image], tuple[Any, ...]]:
+    def __reduce_ex__(
+        self, protocol: SupportsIndex
+    ) -> tuple[Callable[..., Image], tuple[Any, ...]]:
         if any(displacements(self._picture)):  # more than a file can hold
             return Image, (self._picture,)
         from .codec import write
 
-        return _restored, (write.serialized(self), self.damage)
+        data = write.serialized(self)
+        # From protocol 5 on, who carries pickles may carry the file beside them, without copies.
+        held = PickleBuffer(data) if operator.index(protocol) >= 5 else data
+        return _restored, (held, self.damage)
 
     @property
     def layers(self) -> Layers[Layer]:
@@ -199,12 +211,18 @@ class Image(PictureHandle, EditableImage):
 
         return write.to_bytes(self)
 
-    def save(self, path: str | os.PathLike[str]) -> None:
+    def save(self, path: Name | Writable) -> None:
         """Writes the picture to a file, which is replaced in one step if it exists.
+
+        Args:
+            path: Path of the file, or ``-`` for standard output; a URL that fsspec knows, such as
+                ``s3://bucket/a.pxi``; or a file that is open in binary, which stays open.
 
         Raises:
             InputError: The file cannot be written.
             LimitError: The file would exceed what readers accept by default.
+            UnsupportedError: A URL needs a package that is not installed.
+            UsageError: An open file takes text.
 
         Examples:
             >>> import proxyimg_codec as pxi
@@ -213,7 +231,7 @@ class Image(PictureHandle, EditableImage):
             >>> [layer.name for layer in pxi.open("without.pxi").layers]
             ['back', 'bar']
         """
-        write_atomically(path, self.to_bytes())
+        write_bytes(path, self.to_bytes())
 
 
 class Layer(LayerHandle, Editable[Image]):
@@ -254,16 +272,16 @@ class Layer(LayerHandle, Editable[Image]):
         return self.image.edited({"op": op, "layer": self.name, **given})
 
 
-def _restored(data: bytes, damage: tuple[str, ...]) -> Image:
+def _restored(data: Buffer, damage: tuple[str, ...]) -> Image:
     """Restores a pickled image."""
-    return Image(replace(read.from_own_bytes(data), damage=damage))
+    return Image(replace(read.from_own_bytes(bytes(data)), damage=damage))
 
 
-def from_bytes(data: bytes, limits: Limits = DEFAULT_LIMITS, *, tolerant: bool = False) -> Image:
+def from_bytes(data: Buffer, limits: Limits = DEFAULT_LIMITS, *, tolerant: bool = False) -> Image:
     """Decodes a `.pxi` file held in memory.
 
     Args:
-        data: Bytes of the file.
+        data: Bytes of the file: bytes, or any buffer of them, such as a memoryview or mmap.
         limits: Bounds on what decoding the file may cost.
         tolerant: Whether to decode as much as possible of a truncated or damaged file. The damage
             is logged as a warning, and described in `Image.damage`.
@@ -272,6 +290,7 @@ def from_bytes(data: bytes, limits: Limits = DEFAULT_LIMITS, *, tolerant: bool =
         FormatError: The file breaks the format; or, if `tolerant`, too little of it is left.
         UnsupportedError: The file needs a newer reader.
         LimitError: The file exceeds `limits`.
+        UsageError: `data` is no buffer of bytes.
 
     Examples:
         >>> import proxyimg_codec as pxi
@@ -284,18 +303,19 @@ def from_bytes(data: bytes, limits: Limits = DEFAULT_LIMITS, *, tolerant: bool =
 
 
 def open_image(
-    path: str | os.PathLike[str], limits: Limits = DEFAULT_LIMITS, *, tolerant: bool = False
+    path: Name | Readable, limits: Limits = DEFAULT_LIMITS, *, tolerant: bool = False
 ) -> Image:
     """Reads and decodes a `.pxi` file.
 
     Args:
-        path: Path of the file; ``-`` is standard input.
+        path: Path of the file, or ``-`` for standard input; a URL that fsspec knows; or a file that
+            is open in binary, which is read from its present place to its end, and stays open.
         limits: Bounds on what decoding the file may cost.
         tolerant: As for `from_bytes`.
 
     Raises:
         InputError: The file cannot be read.
-        FormatError, UnsupportedError, LimitError: As `from_bytes`.
+        FormatError, UnsupportedError, LimitError, UsageError: As `from_bytes`.
 
     Examples:
         >>> import proxyimg_codec as pxi

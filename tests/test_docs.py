@@ -47,6 +47,9 @@ def folder(tmp_path_factory):
     path = tmp_path_factory.mktemp("docs")
     raster.write(path / "photo.png", smooth(96, 64))
     raster.write(path / "without.png", smooth(96, 64)[::-1])
+    (path / "pictures" / "2026").mkdir(parents=True)
+    for name, size in (("1.png", (24, 17)), ("2026/2.png", (19, 23))):
+        raster.write(path / "pictures" / name, smooth(*size))
     (path / "masks" / "cat").mkdir(parents=True)
     mask = disc(96, 64)
     low = np.zeros_like(mask)
@@ -55,6 +58,12 @@ def folder(tmp_path_factory):
     eye[26:32, 44:50] = True
     for name, m in (("1 bush", low), ("2 cat", mask), ("cat/eye", eye)):
         raster.write(path / "masks" / f"{name}.png", np.repeat(m[..., None] * np.uint8(255), 3, 2))
+    (path / "soft").mkdir()
+    rim = np.clip(
+        1.6 - np.hypot(*(np.mgrid[:64, :96] - np.array([30, 50])[:, None, None])) / 16, 0, 1
+    )
+    fur = np.rint(255 * rim).astype(np.uint8)
+    raster.write(path / "soft" / "1 fur.png", np.repeat(fur[..., None], 3, 2))
     labels = np.where(mask, 2, low.astype(int)).astype(np.uint8)
     raster.write(path / "labels.png", np.repeat(labels[..., None], 3, 2))
     clear = np.dstack([smooth(96, 64), disc(96, 64) * np.uint8(255)])

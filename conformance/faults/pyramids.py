@@ -207,6 +207,27 @@ def _without(*fields: str) -> Any:
     return lambda *args: replace(unpack_of(*args), **absent)
 
 
+def _bare_alone(self: Occlusion, moved: Moved) -> Any:
+    return loose_of(self, moved) if self.own is None else self._bared(moved)
+
+
+def _never_apart(*args: Any) -> Moved:
+    return neighbour_of(*args)._replace(apart=False)
+
+
+def _soft_where_bare(self: PyramidTexture, moved: Moved) -> Any:
+    """Soft samples that layers in front hid show as if they were opaque."""
+    kept = kept_of(self, moved)
+    if self.matte is None or self.cuts is None or moved.behind:
+        return kept
+    return None if kept is None else kept | self.soft
+
+
+def _trusting(self: PyramidTexture, trusted: Any) -> Any:
+    whole = self._present if self.cuts is None else self.cuts.trusted
+    return known_of(self, trusted if self.matte is None else whole)
+
+
 def _down_first(*args: Any) -> PyramidTexture:
     found = unpack_of(*args)
     copies = found.copies
@@ -241,9 +262,11 @@ bands_of, mirrored_of, level_of = Grid.bands, grid.mirrored_indices, LevelCoder.
 grid_of, wave_of, escape_of = Grid.of, LevelCoder._wave, latents.Decoder._escape
 position_of, samples_of = sampling.position, PyramidTexture._samples
 unpack_of, premultiplied_of = pyramid.unpack, compose.premultiplied
-moved_of, known_of = Occlusion.moved, PyramidTexture._known
+moved_of, known_of = Occlusion.moved, PyramidTexture.known
 still_of, neighbours_of = Pose.still, neighbours.moved_neighbours
 tiles_of, taps_of = Grid.tiles, thumbnail._taps
+neighbour_of = neighbours._moved
+loose_of, kept_of = Occlusion.loose, PyramidTexture.kept
 copies_of, weights_of, bases_of = completion.unpack, completion._weights, completion._bases
 
 _FAULTS: dict[str, list[Patch]] = {
@@ -308,8 +331,16 @@ _FAULTS: dict[str, list[Patch]] = {
     "loses-rims-of-what-moves-together": [(Occlusion, "moved", _back_bares)],
     "ignores-behind": [(pyramid, "unpack", _without("behind", "behind_alpha"))],
     "ignores-alpha-behind": [(pyramid, "unpack", _without("behind_alpha"))],
-    "behind-over-trusted": [(PyramidTexture, "_known", _over_trusted)],
-    "behind-without-cells": [(PyramidTexture, "_known", _everywhere_behind)],
+    "behind-over-trusted": [(PyramidTexture, "known", _over_trusted)],
+    "behind-without-cells": [(PyramidTexture, "known", _everywhere_behind)],
+    "ignores-mattes": [(pyramid, "unpack", _without("matte"))],
+    "mattes-at-rest": [(Occlusion, "loose", lambda self, moved: np.ones(self.box[:1:-1], bool)),
+        (PyramidTexture, "shown", property(lambda self: self._present & ~self.soft))],
+    "mattes-without-reach": [(Occlusion, "loose", _bare_alone)],
+    "mattes-over-what-was-there": [(neighbours, "_moved", _never_apart)],
+    "mattes-of-moved-layers-alone": [(PyramidTexture, "kept", _soft_where_bare)],
+    "soft-layers-hide": [(Occlusion, "moved", lambda self, *of: moved_of(self, *of[:3]))],
+    "trusts-soft-samples": [(PyramidTexture, "known", _trusting)],
     "ignores-references": [(pyramid, "unpack", _without("copies"))],
     "offsets-down-first": [(pyramid, "unpack", _down_first)],
     "sources-without-upper-bits": [(pyramid, "unpacked_copies", _low_sources)],

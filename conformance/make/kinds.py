@@ -19,7 +19,7 @@ VALID: Mapping[str, Mapping[str, Valid]] = {
     name: _cases(f"valid.{name}")
     for name in (
         "layers", "textures", "networks", "canvases", "levels", "versions", "metadata", "meshes",
-        "poses", "samplings", "pyramids", "views", "behind", "motion",
+        "poses", "samplings", "pyramids", "views", "behind", "mattes", "motion",
     )
 }  # fmt: skip
 """Valid cases by kind and name."""
@@ -28,7 +28,7 @@ REFUSED: Mapping[str, Mapping[str, Refused]] = {
     f"refused-{name}": _cases(f"refused.{name}")
     for name in (
         "framing", "structure", "values", "arrays", "bombs", "poses", "pyramids", "views",
-        "behind", "motion", "metadata",
+        "behind", "mattes", "motion", "metadata",
     )
 }  # fmt: skip
 """Cases of files that must be refused, by kind and name."""

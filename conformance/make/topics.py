@@ -103,6 +103,7 @@ _TOPICS = {
     "pyramid: moved": "PYR-46 PYR-52",
     "pyramid: behind": "PYR-47",
     "pyramid: copies": "PYR-48 PYR-49",
+    "pyramid: matte": "PYR-53",
     "pyramid: rim": "PYR-50 PYR-51",
     # Rendering.
     "opaque": "CHK-3 REN-12",

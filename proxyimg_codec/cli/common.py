@@ -30,13 +30,20 @@ class _Parser(argparse.ArgumentParser):
         super().error(printable(message))
 
 
-def parser(prog: str, description: str) -> argparse.ArgumentParser:
-    """Creates an argument parser in the style of all tools."""
+def parser(prog: str, description: str, *about: str) -> argparse.ArgumentParser:
+    """Creates an argument parser in the style of all tools.
+
+    Args:
+        prog: Name of the tool.
+        description: What it does.
+        about: More lines that ``--version`` prints.
+    """
     p = _Parser(
         prog, description=description, epilog=EXIT_CODES,
         formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False,
     )  # fmt: skip
-    p.add_argument("--version", action="version", version=f"{prog} {__version__}")
+    version = "\n".join((f"{prog} {__version__}", *about)).replace("%", "%%")
+    p.add_argument("--version", action="version", version=version)
     return p
 
 
@@ -86,29 +93,42 @@ def run(prog: str, work: Callable[[], None]) -> int:
             work()
             print(end="", flush=True)
         return 0
-    except PxiError as error:
-        code, message = error.exit_code, str(error)
     except KeyboardInterrupt:
         code, message = 130, "interrupted"
     except SystemExit as end:  # raised by `ending` alone
-        code, message = int(end.code or 0), "terminated"
-    except MemoryError:
-        code, message = 6, "not enough memory; ask for a smaller picture or region"
-    except BrokenPipeError:
-        # The reader of the output is gone, so that nobody would see a message.
-        code, message = 3, ""
-    except ModuleNotFoundError as error:
-        if (error.name or "").startswith("proxyimg_codec"):
+        code = int(end.code or 0)
+        message = "interrupted" if code == 130 else "terminated"
+    except Exception as error:  # what nobody expects is raised again
+        known = failure(error)
+        if known is None:
             raise
-        code, message = 5, f"this needs {error.name}: pip install 'proxyimg-codec[all]'"
-    except OSError as error:
-        place = "" if error.filename is None else f"{error.filename}: "
-        code, message = 3, f"{place}{error.strerror or error}"
+        code, message = known
     _drop_output()
     if message:
         with contextlib.suppress(OSError):  # a terminal that was closed
             print(f"{prog}: {printable(message.strip())}", file=sys.stderr)
     return code
+
+
+def failure(error: Exception) -> tuple[int, str] | None:
+    """Exit code and message of an error; None if it is not one of those that users cause.
+
+    The message is empty if nobody would see it.
+    """
+    if isinstance(error, PxiError):
+        return error.exit_code, str(error)
+    if isinstance(error, MemoryError):
+        return 6, "not enough memory; ask for a smaller picture or region"
+    if isinstance(error, BrokenPipeError):  # the reader of the output is gone
+        return 3, ""
+    if isinstance(error, ModuleNotFoundError):
+        if (error.name or "").startswith("proxyimg_codec"):
+            return None
+        return 5, f"this needs {error.name}: pip install 'proxyimg-codec[all]'"
+    if isinstance(error, OSError):
+        place = "" if error.filename is None else f"{error.filename}: "
+        return 3, f"{place}{error.strerror or error}"
+    return None
 
 
 class _OneLine(logging.Formatter):
@@ -166,6 +186,13 @@ class Bar:
         """Advances the bar by `count` steps."""
         if self._bar is not None:
             self._bar.update(count)
+
+    def say(self, text: str) -> None:
+        """Prints a line on stderr, above the bar."""
+        if self._bar is None:
+            print(text, file=sys.stderr)
+        else:
+            self._bar.write(text, file=sys.stderr)
 
     def close(self) -> None:
         """Removes the bar."""

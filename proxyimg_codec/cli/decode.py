@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import sys
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from ..errors import FormatError, UsageError
+from .batch.each import each
+from .batch.tool import Tool, add_batch
 from .common import (
     EXIT_CODES,
     Bar,
@@ -19,9 +22,8 @@ from .common import (
     limits_of,
     parser,
     printable,
-    warnings_shown,
 )  # fmt: skip
-from .places import add_files, check_target, default_target, each, is_stream, parse, same_file
+from .places import add_files, check_target, default_target, is_stream, parse, same_file
 
 LAYERED = (".ora", ".svg")
 """Suffixes of output files that hold layers instead of one flat picture."""
@@ -65,10 +67,12 @@ def arguments() -> argparse.ArgumentParser:
         "or the whole renderer, from points of the canvas to colour")  # fmt: skip
     add("--sheet", metavar="FILE", help="draw all layers beside each other, with names, sizes and "
         "the cost of outlines")  # fmt: skip
+    add("-j", "--jobs", type=int, metavar="N", help="of several pictures so many at once; as many "
+        "as there are cores by default")  # fmt: skip
     add_limits(p)
+    add_batch(p)
     add("-f", "--force", action="store_true", help="replace files that exist")
     add("--quiet", action="store_true", help="print nothing but errors")
-    p.set_defaults(prog="pxi-decode")
     return p
 
 
@@ -76,9 +80,19 @@ def main(argv: list[str] | None = None) -> int:
     """Entry point; returns the exit code."""
     args = parse(arguments(), argv)
     damage: list[str] = []
-    with warnings_shown("pxi-decode"):
-        code = each("pxi-decode", args, ".png", check, lambda one: damage.extend(decode_file(one)))
+
+    def told(report: dict[str, Any], args: argparse.Namespace, say: Callable[[str], None]) -> None:
+        damage.extend(report["damage"])
+        if report["seconds"] is not None and not args.quiet:
+            say(f"{printable(report['output'])}: {report['seconds']:.2f} s")
+
+    code = each(Tool("pxi-decode", ".png", takes, check, decode_file, told, hush=False), args)
     return code or (DAMAGED if damage else 0)
+
+
+def takes(name: str) -> bool:
+    """Whether a file in a folder is one to decode."""
+    return name.lower().endswith(".pxi")
 
 
 def check(args: argparse.Namespace) -> None:
@@ -95,11 +109,12 @@ def check(args: argparse.Namespace) -> None:
         raise UsageError("--sheet: of several pictures, draw that of each by itself")
 
 
-def decode_file(args: argparse.Namespace) -> Sequence[str]:
+def decode_file(args: argparse.Namespace) -> dict[str, Any]:
     """Runs pxi-decode with parsed arguments for one input.
 
     Returns:
-        Descriptions of the damage in the input; empty for a file that is intact.
+        ``output``; ``seconds`` of drawing it, None if nothing was drawn; and descriptions of the
+        ``damage`` in the input, none for a file that is intact.
 
     Raises:
         PxiError: Anything that goes wrong, as the class that decides the exit code.
@@ -137,10 +152,8 @@ def decode_file(args: argparse.Namespace) -> Sequence[str]:
             write_sheet(image, args)
         if rendering:
             draw(image, output, args)
-    if rendering and not args.quiet:
-        print(f"{printable(output)}: {time.perf_counter() - started:.2f} s", file=sys.stderr)
-    damage: Sequence[str] = image.damage
-    return damage
+    seconds = round(time.perf_counter() - started, 3) if rendering else None
+    return {"output": output, "seconds": seconds, "damage": list(image.damage)}
 
 
 def draw(image: Any, output: str, args: argparse.Namespace) -> None:
@@ -290,7 +303,7 @@ def render(image: Any, output: str, args: argparse.Namespace) -> None:
         sides = region[2:] if region else (image.width, image.height)
         scale = min(1.0, args.fit / max(1, *sides))
     view = make_view((image.width, image.height), args.width, args.height, scale, region)
-    bar = Bar(view.width * view.height, "rendering", args.quiet)
+    bar = Bar(view.width * view.height, "rendering", args.quiet or args.batch)
     depth = args.bit_depth or (16 if Path(output).suffix.lower() in LINEAR else 8)
     dtype = {8: np.uint8, 16: np.uint16, 32: np.float32}[depth]
     converted = args.srgb and not is_srgb(image.blocks)
@@ -317,9 +330,9 @@ def render(image: Any, output: str, args: argparse.Namespace) -> None:
 
 
 def remark(args: argparse.Namespace, output: str, notes: Iterable[str]) -> None:
-    """Prints warnings about an output, unless --quiet."""
+    """Warns about an output, unless --quiet."""
     for note in () if args.quiet else notes:
-        print(f"{args.prog}: warning: {printable(output)}: {note}", file=sys.stderr)
+        logging.getLogger(__name__).warning("%s: %s", output, note)
 
 
 def layered(image: Any, output: str, kind: str, args: argparse.Namespace) -> None:
@@ -339,7 +352,7 @@ def layered(image: Any, output: str, kind: str, args: argparse.Namespace) -> Non
         return
     from ..export.openraster import build as build_ora
 
-    bar = Bar(len(selected(image, args.layer)), "layers", args.quiet)
+    bar = Bar(len(selected(image, args.layer)), "layers", args.quiet or args.batch)
     try:
         dtype = "uint16" if args.bit_depth == 16 else "uint8"
         limits = limits_of(args)

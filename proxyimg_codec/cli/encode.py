@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import argparse
 import json
+import logging
 import os
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import fields
 from typing import Any
 
-from .common import Bar, parser, printable, warnings_shown
+from ..io.names import is_picture
+from .batch.each import each
+from .batch.tool import Tool, add_batch
+from .common import Bar, parser, printable
 from .layered_input import encoded_layers, layered_input
 from .places import (
     add_files,
@@ -19,7 +24,6 @@ from .places import (
     check_suffix,
     check_target,
     default_target,
-    each,
     parse,
 )
 from .prompt_flags import FLAGS, add_prompts, check_prompts, found_layers, pointed
@@ -42,6 +46,7 @@ def arguments() -> argparse.ArgumentParser:
     _add_decomposition(p)
     _add_details(p)
     _add_reading(p)
+    add_batch(p)
     p.add_argument("-f", "--force", action="store_true", help="replace OUT if it exists")
     add_force_suffix(p)
     p.add_argument("--quiet", action="store_true", help="print nothing but errors")
@@ -97,6 +102,9 @@ def _add_decomposition(p: argparse.ArgumentParser) -> None:
         "inpaints: an ONNX file, or a name of pxi-models")  # fmt: skip
     add("--behind", metavar="FILE", help="the picture without its objects, of the same size: what "
         "the back layer shows where they were; pyramid")  # fmt: skip
+    add("--matte", choices=["auto", "hard", "soft"], help="soft masks, as of hair: "
+        "auto keeps their alpha where they have soft rims (default), hard cuts them at one half, "
+        "soft also finds that of hard masks by the colours along outlines; pyramid")  # fmt: skip
     add("--mesh", metavar="NAME", help="who makes proxy nodes: delaunay (default with texture "
         "implicit), triwild, ftetwild, or none (default with pyramid: edits make "
         "them)")  # fmt: skip
@@ -109,8 +117,8 @@ def _add_details(p: argparse.ArgumentParser) -> None:
     add("--net-bits", type=int, metavar="2-8", help="bits a network weight; default 8; "
         "like --feature-bits for texture implicit")  # fmt: skip
     add("--seed", type=int, default=0, help="seed of everything random; default 0")
-    add("-j", "--jobs", type=int, metavar="N", help="cores to use, by threads, at most 4 of use "
-        "for one picture; all by default")  # fmt: skip
+    add("-j", "--jobs", type=int, metavar="N", help="cores to use, all by default: of several "
+        "pictures so many at once, for one by threads, of which 4 are of use")  # fmt: skip
     add("--device", choices=["cpu", "cuda"], default="cpu", help="where to fit; default cpu")
 
 
@@ -133,8 +141,13 @@ def _add_reading(p: argparse.ArgumentParser) -> None:
 def main(argv: list[str] | None = None) -> int:
     """Entry point; returns the exit code."""
     args = parse(arguments(), argv)
-    with warnings_shown("pxi-encode", args.quiet):
-        return each("pxi-encode", args, ".pxi", check, encode_file)
+    tool = Tool("pxi-encode", ".pxi", takes, check, encode_file, tell, hush=True)
+    return each(tool, args)
+
+
+def takes(name: str) -> bool:
+    """Whether a file in a folder is a picture to encode."""
+    return is_picture(name) and not name.lower().endswith((".pxi", ".svg"))
 
 
 def check(args: argparse.Namespace) -> None:
@@ -154,8 +167,11 @@ def check(args: argparse.Namespace) -> None:
     check_prompts(args)
 
 
-def encode_file(args: argparse.Namespace) -> None:
+def encode_file(args: argparse.Namespace) -> dict[str, Any]:
     """Runs pxi-encode with parsed arguments for one input.
+
+    Returns:
+        The report of the output, as --json prints it.
 
     Raises:
         PxiError: Anything that goes wrong, as the class that decides the exit code.
@@ -178,9 +194,10 @@ def encode_file(args: argparse.Namespace) -> None:
 
     started, cpu = time.perf_counter(), time.process_time()
     if not args.stack and os.path.isdir(args.input):
-        raise InputError(f"{args.input}: is a folder; --stack makes layers of its pictures")
+        raise InputError(f"{args.input}: is a folder; -o FOLDER/ encodes the pictures in it, "
+                         "--stack makes layers of them")  # fmt: skip
     source = b"" if args.stack else read_bytes(args.input)
-    bar = Bar(settings.steps, "fitting", args.quiet or args.json)
+    bar = Bar(settings.steps, "fitting", args.quiet or args.json or args.batch)
     try:
         image, original = encoded(source, args, settings, bar)
     finally:
@@ -191,7 +208,7 @@ def encode_file(args: argparse.Namespace) -> None:
     # replaces nothing.
     quality = psnr(original, from_bytes(data))
     write_atomically(output, data)
-    report = {
+    return {
         "output": output,
         "width": image.width,
         "height": image.height,
@@ -203,10 +220,14 @@ def encode_file(args: argparse.Namespace) -> None:
         "seconds": round(time.perf_counter() - started, 2),
         "cpu_seconds": round(time.process_time() - cpu, 2),
     }
+
+
+def tell(report: dict[str, Any], args: argparse.Namespace, say: Callable[[str], None]) -> None:
+    """Tells of an output."""
     if args.json:
-        print(json.dumps(report))
+        print(json.dumps(report), flush=True)
     elif not args.quiet:
-        print(printable(describe(report)), file=sys.stderr)
+        say(printable(describe(report)))
 
 
 def files_in(path: str | None) -> list[str]:
@@ -261,7 +282,7 @@ def encoded(source: bytes, args: argparse.Namespace, settings: Any, bar: Bar) ->
     if masks is None and settings.max_layers > 1 and len(image.layers) == 1:
         notes.append("no object was found: one layer; point at what is to be one (--point)")
     for note in () if args.quiet else notes:
-        print(f"pxi-encode: warning: {printable(name)}: {note}", file=sys.stderr)
+        logging.getLogger(__name__).warning("%s: %s", name, note)
     return image, picture.pixels
 
 

@@ -13,21 +13,19 @@ from ..container.chunks import VERSION
 from ..container.content import Container
 from ..container.file import parse
 from ..io.files import naming, read_bytes
+from ..native import levels
 from .common import add_limits, limits_of, parser, printable, run
 
 CODERS = {texr.IMPLICIT: "implicit", texr.PYRAMID: "pyramid"}
 VIEWED = ("grid", "bits", "network", "planes", "part", "cuts", "grain")
 """Fields of textures that are printed unchanged; each coder has only some of them."""
 
-PLANES = ("alpha", "behind", "behind_alpha")
-"""Fields of textures that are 0, or the number of planes and 1."""
-
 SAMPLINGS = ("direct", "node", "node, local only", "node, global only")
 
 
 def arguments() -> argparse.ArgumentParser:
     """Parser of the command line."""
-    p = parser("pxi-info", "Describe a .pxi file.")
+    p = parser("pxi-info", "Describe a .pxi file.", str(levels.chosen()))
     p.add_argument("input", metavar="IN", help=".pxi file, or - for standard input")
     add_limits(p)
     p.add_argument("--json", action="store_true", help="print JSON")
@@ -114,7 +112,7 @@ def _texture(c: Container, i: int) -> dict[str, Any]:
     return {
         "coder": CODERS[texture["coder"]],
         **{k: texture.get(k) for k in VIEWED},
-        **{k: texture[k] - 1 if texture.get(k) else None for k in PLANES},
+        **{k: texture[k] - 1 if texture.get(k) else None for k in texr.PLANES},
         "offsets": len(texture["offsets"]) // 2 if "offsets" in texture else None,
         "sampling": SAMPLINGS[c.layers[i]["sampling"]],
         "shares": c.textures[i].get("texture"),
@@ -239,6 +237,8 @@ def _texture_text(layer: dict[str, Any]) -> str:
     own = "" if layer["behind"] is None else f", planes {layer['behind']} behind"
     if layer["behind_alpha"] is not None:
         own += f" with alpha of planes {layer['behind_alpha']}"
+    if layer["matte"] is not None:
+        own += f", soft by planes {layer['matte']}"
     if layer["offsets"]:
         own += f", {layer['offsets']} offsets for cells of {1 << layer['grain']} samples"
     return f"{width}x{height} samples at {x},{y} of planes {layer['planes']}{alpha}{cuts}{own}"

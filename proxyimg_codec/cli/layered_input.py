@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import os
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from .common import printable
 from .prompt_flags import FLAGS
 
-DECOMPOSITION = ("masks", *FLAGS, "layers", "max_layers", "segmenter", "depth", "frame", "tone")
+DECOMPOSITION = (
+    "masks", *FLAGS, "layers", "max_layers", "segmenter", "depth", "matte", "frame", "tone",
+)  # fmt: skip
 """Flags that make layers of a flat picture, or choose one of several."""
 
 
@@ -101,6 +102,6 @@ def encoded_layers(
 
 
 def warn(args: argparse.Namespace, name: str, text: str) -> None:
-    """Prints a warning about an input, unless --quiet is given."""
+    """Warns about an input, unless --quiet is given."""
     if not args.quiet:
-        print(f"pxi-encode: warning: {printable(name)}: {printable(text)}", file=sys.stderr)
+        logging.getLogger(__name__).warning("%s: %s", name, text)

@@ -6,22 +6,13 @@ import argparse
 import os
 import stat
 import sys
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
-from typing import Any
 
-from ..errors import InputError, PxiError, UsageError
+from ..errors import InputError, UsageError
 from ..io.names import renamed
-from .common import run
-
-Work = Callable[[argparse.Namespace], Any]
 
 _INPUT = ("/dev/stdin", "/dev/fd/0", "/proc/self/fd/0")
 _OUTPUT = ("/dev/stdout", "/dev/fd/1", "/proc/self/fd/1")
-
-INTERRUPTED = 128
-"""Least exit code of a program that a signal ended."""
 
 
 def add_files(p: argparse.ArgumentParser, inputs: str, output: str) -> None:
@@ -32,11 +23,12 @@ def add_files(p: argparse.ArgumentParser, inputs: str, output: str) -> None:
         inputs: What an input is, for the help.
         output: What the output is, for the help.
     """
-    p.usage = "%(prog)s [options] IN [OUT]\n       %(prog)s [options] IN... -o FOLDER/"
+    p.usage = "%(prog)s [options] IN [OUT]\n       %(prog)s [options] IN|DIR|GLOB... -o FOLDER/"
     p.add_argument("files", metavar="IN [OUT]", nargs="*", default=[], help=f"{inputs}; {output}")
     p.add_argument(
         "-o", "--out", metavar="OUT", help="instead of the second name: a file, or for several "
-        "inputs a folder, which is made if its name ends in /"
+        "inputs, a folder of them (DIR) or a pattern like 'photos/**/*.jpg' (GLOB) a folder, which "
+        "is made if its name ends in /"
     )  # fmt: skip
 
 
@@ -92,87 +84,6 @@ def in_and_out(
     if len(names) == 1:
         return source, None
     return source, "-" if names[1] in _OUTPUT else names[1]
-
-
-def pairs(args: argparse.Namespace, suffix: str) -> list[tuple[str, str | None]]:
-    """Inputs that a command line names, each with its output; None if none is named.
-
-    Args:
-        args: The command line, as of `add_files`.
-        suffix: Suffix of the outputs in a folder.
-
-    Raises:
-        UsageError: Two inputs have the same output, several inputs have no folder, or a name is
-            empty.
-        InputError: An input has no name to make one of.
-    """
-    out = args.out
-    folder = out is not None and (out.endswith("/") or os.path.isdir(out))
-    if not folder:
-        if out is not None and len(args.files) > 1:
-            raise UsageError(f"-o {out}: several inputs go into a folder; write -o {out}/")
-        several = "of several inputs the output is a folder: -o FOLDER/"
-        return [in_and_out(args.files, out, several)]
-    check_names(*args.files)
-    if not args.files:
-        raise UsageError("IN is missing; see --help")
-    found: list[tuple[str, str | None]] = []
-    taken: dict[str, str] = {}
-    for source in args.files:
-        if source == "-" or source in _INPUT:
-            raise UsageError(f"-o {out}: what comes from standard input has no name; give OUT")
-        target = os.path.join(out, os.path.basename(default_target(source, suffix)))
-        place = os.path.realpath(target)
-        if place in taken:
-            raise UsageError(f"{taken[place]} and {source} would both become {target}")
-        taken[place] = source
-        found.append((source, target))
-    return found
-
-
-def each(prog: str, args: argparse.Namespace, suffix: str, check: Work, work: Work) -> int:
-    """Runs a tool on its inputs, one after the other.
-
-    What fails with one input does not stop the others; each failure is one line on stderr.
-
-    Args:
-        prog: Name of the tool in error messages.
-        args: The command line, as of `add_files`.
-        suffix: Suffix of outputs in a folder.
-        check: Raises an error if the command line makes no sense for any input.
-        work: Does the work for one input: the command line then has `input` and `output`, which may
-            be None, and all `inputs`.
-
-    Returns:
-        The exit code: that of the first failure; of an interruption, which ends everything.
-    """
-    found: list[tuple[str, str | None]] = []
-
-    def prepare() -> None:
-        found.extend(pairs(args, suffix))
-        args.inputs = [source for source, _ in found]
-        check(args)
-        if args.out is not None and args.out.endswith("/"):
-            os.makedirs(args.out, exist_ok=True)
-
-    first = run(prog, prepare)
-    for source, target in [] if first else found:
-        one = argparse.Namespace(**vars(args), input=source, output=target)
-        code = run(prog, partial(_named, work, one))
-        if code > INTERRUPTED:
-            return code
-        first = first or code
-    return first
-
-
-def _named(work: Work, args: argparse.Namespace) -> None:
-    """Does the work for one input; if there are several, errors tell which one failed."""
-    try:
-        work(args)
-    except PxiError as error:
-        if len(args.inputs) > 1 and args.input not in str(error):
-            error.args = (f"{args.input}: {error}",)
-        raise
 
 
 def default_target(source: str, suffix: str) -> str:

@@ -3,25 +3,29 @@
 from __future__ import annotations
 
 import logging
-import os
 from collections.abc import Sequence
 from dataclasses import fields
+from typing import TYPE_CHECKING
 
 from ..container.chunks import Chunk
 from ..container.file import assemble, parse_within
-from ..io.files import naming, read_bytes
+from ..io.files import Name, naming, read_bytes
+from ..io.streams import Readable, bytes_of
 from ..limits import DEFAULT_LIMITS, Budget, Limits, enough_memory
 from ..model import Picture
 from .unpack import unpack
 
+if TYPE_CHECKING:
+    from typing_extensions import Buffer
+
 _END = Chunk("TAIL", b"")
 
 
-def from_bytes(data: bytes, limits: Limits = DEFAULT_LIMITS, *, tolerant: bool = False) -> Picture:
+def from_bytes(data: Buffer, limits: Limits = DEFAULT_LIMITS, *, tolerant: bool = False) -> Picture:
     """Decodes a `.pxi` file held in memory.
 
     Args:
-        data: Bytes of the file.
+        data: Bytes of the file: bytes, or any buffer of them, such as a memoryview or mmap.
         limits: Bounds on what decoding the file may cost.
         tolerant: Whether to decode as much as possible of a truncated or damaged file. The damage
             is logged as a warning, and described in `Picture.damage`.
@@ -30,7 +34,9 @@ def from_bytes(data: bytes, limits: Limits = DEFAULT_LIMITS, *, tolerant: bool =
         FormatError: The file breaks the format; or, if `tolerant`, too little of it is left.
         UnsupportedError: The file needs a newer reader.
         LimitError: The file exceeds `limits`.
+        UsageError: `data` is no buffer of bytes.
     """
+    data = bytes_of(data)
     damage: tuple[str, ...] = ()
     with enough_memory("for the file"):
         if tolerant:
@@ -47,12 +53,12 @@ def from_bytes(data: bytes, limits: Limits = DEFAULT_LIMITS, *, tolerant: bool =
 
 
 def from_file(
-    path: str | os.PathLike[str], limits: Limits = DEFAULT_LIMITS, *, tolerant: bool = False
+    path: Name | Readable, limits: Limits = DEFAULT_LIMITS, *, tolerant: bool = False
 ) -> Picture:
     """Reads and decodes a `.pxi` file.
 
     Args:
-        path: Path of the file; ``-`` is standard input.
+        path: Path of the file, ``-`` for standard input; a URL; or a file that is open in binary.
         limits: Bounds on what decoding the file may cost.
         tolerant: As for `from_bytes`.
 

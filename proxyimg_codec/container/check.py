@@ -149,7 +149,7 @@ def _check_textures(c: Container, budget: Budget) -> None:
 def _spend_view(number: int, own: Values, budget: Budget) -> None:
     """Spends what decoding and filling the view of TEXR `number` costs, without its planes."""
     area = own["part"][2] * own["part"][3]
-    if own["mask"] or own["cuts"]:
+    if own["mask"] or own["cuts"] or own["matte"]:
         # Where samples are copied, how they differ from what lies beside them is filled, too.
         budget.spend("filled", 2 * area if own["sources"] else area)
     # Where a layer is cut by its own boundary, the coverage of every layer behind it may be needed
@@ -193,20 +193,23 @@ def _check_view(c: Container, layer: Values, texture: Values) -> int:
         raise FormatError("the part is empty or leaves the planes", "chunk TEXR", rule="PYR-38")
     if texture["cell"] and not texture["mask"]:
         raise FormatError("cells without a mask", "chunk TEXR", rule="PYR-39")
-    if not texture["alpha"]:
-        return 3
-    alpha = c.planes[texture["alpha"] - 1]
-    if alpha["components"] != 1 or alpha["size"] != [columns, rows]:
-        raise FormatError(
-            "planes of alpha are not grey, or of another size", "chunk TEXR", rule="PYR-38"
-        )
-    if c.head["channels"] != 4:
-        raise FormatError("more channels than HEAD has", "chunk TEXR", rule="PYR-38")
-    return 4
+    for key, size, rule in (
+        ("alpha", [columns, rows], "PYR-38"), ("matte", [width, height], "PYR-53"),
+    ):  # fmt: skip
+        own = c.planes[texture[key] - 1] if texture[key] else None
+        if own and (own["components"] != 1 or own["size"] != size):
+            raise FormatError(
+                f"planes of {key} are not grey, or of another size", "chunk TEXR", rule=rule
+            )
+        if own and c.head["channels"] != 4:
+            raise FormatError("more channels than HEAD has", "chunk TEXR", rule=rule)
+    return 4 if texture["alpha"] or texture["matte"] else 3
 
 
 def _check_behind(c: Container, texture: Values) -> None:
-    """Checks `behind` and `behind_alpha` of a pyramid texture."""
+    """Checks `behind` and `behind_alpha` of a pyramid texture, and what a matte needs of it."""
+    if texture["matte"] and (texture["unmix"] or not texture["behind"]):
+        raise FormatError("a matte without behind, or with unmix", "chunk TEXR", rule="PYR-53")
     if texture["behind_alpha"] and not (texture["behind"] and texture["alpha"]):
         raise FormatError(
             "behind_alpha without behind, or without alpha", "chunk TEXR", rule="PYR-47"

@@ -22,12 +22,12 @@ OFFSETS_MAX = 255
 CELLS_MAX = 1 << 16
 """Most cells of sources, which are balanced many times."""
 
-COMPLETED_FROM = (0, 11)
-"""First version whose pyramid textures have the fields of `ABSENT`."""
-
-ABSENT: dict[str, Any] = {
+COMPLETED: dict[str, Any] = {
     "behind": 0, "behind_alpha": 0, "grain": 0, "offsets": [], "sources": b"", "unmix": 0,
 }  # fmt: skip
+"""Fields that pyramid textures have since version 0.11, with values that have no effect."""
+
+ABSENT: dict[str, Any] = {**COMPLETED, "matte": 0}
 """Values for what pyramid textures of earlier versions do not have."""
 
 _CODER = Field("coder", "int", "Texture coder: 0 = shared, 1 = implicit, 2 = pyramid.", 0, 255)
@@ -75,13 +75,18 @@ PYRAMID_FIELDS = (
           "from 1; 0 = none; empty = none at all."),
     Field("unmix", "int", "1 = samples at the boundary of the layer itself are unmixed where what "
           "is behind has changed; 0 = they are filled.", 0, 1),
+    Field("matte", "int", "0 = none, n = planes n - 1 give the alpha of soft samples where what is "
+          "behind has changed.", 0, 1 << 16),
 )  # fmt: skip
+
+PLANES = ("alpha", "behind", "behind_alpha", "matte")
+"""Fields of pyramid textures that are 0, or the number of planes and 1."""
 
 CODERS = {SHARED: SHARED_FIELDS, IMPLICIT: FIELDS, PYRAMID: PYRAMID_FIELDS}
 """Fields of TEXR by coder."""
 
-_EARLIER = {**CODERS, PYRAMID: PYRAMID_FIELDS[: -len(ABSENT)]}
-"""Fields before version `COMPLETED_FROM`."""
+_ADDED = (((0, 11), len(ABSENT)), ((0, 12), len(ABSENT) - len(COMPLETED)))
+"""Versions that added fields of pyramid textures, and how many end what is older."""
 
 
 def fields_of(payload: bytes, version: tuple[int, int] = VERSION) -> tuple[Field, ...]:
@@ -109,12 +114,14 @@ def fields_of(payload: bytes, version: tuple[int, int] = VERSION) -> tuple[Field
             coder = int.from_bytes(second)
     if coder not in CODERS:
         raise UnsupportedError(f"chunk TEXR: texture coder {coder} is not known", rule="CHK-13")
-    return (CODERS if version >= COMPLETED_FROM else _EARLIER)[coder]
+    fields = CODERS[coder]
+    newer = next((count for since, count in _ADDED if version < since), 0)
+    return fields[:-newer] if coder == PYRAMID and newer else fields
 
 
 def planes_of(fields: Mapping[str, Any]) -> list[int]:
     """Numbers of the planes that a pyramid texture names, in the order of its fields."""
-    others = (fields[key] - 1 for key in ("alpha", "behind", "behind_alpha") if fields[key])
+    others = (fields[key] - 1 for key in PLANES if fields[key])
     return [fields["planes"], *others]
 
 

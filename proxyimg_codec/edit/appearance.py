@@ -21,6 +21,7 @@ from ..texture.network import Network
 from ..texture.occlusion import Occlusion
 from ..texture.pyramid import PyramidTexture, Texture
 from .operations import changed, layer_named, operation, shown_together, substituted
+from .soft_textures import with_matte, without_matte
 from .transforms import TARGET, meshed, sampled
 
 LUMA = (0.2126, 0.7152, 0.0722)
@@ -168,6 +169,10 @@ def texture(
         shown = brought(picture, home, origin, networks)
     if isinstance(shown, PyramidTexture) and shown.cuts is not None and origin is not target:
         shown = shown.masked(shown.cuts.everything)
+    if isinstance(shown, PyramidTexture) and origin is not target:
+        shown = without_matte(shown)
+    if fit == "box" and origin is not target:
+        shown = with_matte(shown, target, effort)
     if origin.sampling and fit == "shape":
         raise UsageError(
             f"texture: layer {origin.name!r} has its features at its own nodes, which do not fit "

@@ -234,6 +234,7 @@ def _shared(layer: Layer, boundary: Boundary) -> tuple[Part, Texture]:
         tuple(front for front in old.fronts if (coverage(front, box)[near] > 0).any()),
         box,
         within(mask, cell, part),
+        texture.matte is None,
     )
     return (
         (box, replace(texture, part=part, cell=cell, mask=mask, cuts=own, copies=None)),

@@ -209,9 +209,10 @@ def _joined(
     deciding = [cuts[v] for v in ([holder] if holder else cuts)]
     own = boundary if any(each and each.own for each in deciding) else None
     left = tuple(front for front in dict.fromkeys(fronts) if front in known and front is not None)
-    new = Occlusion(own, left, box, within(mask, cell, part)) if own or left else None
     base = two if holder is high else one
-    hidden = [(v.behind, v.behind_alpha, v.copies) for v in (one, two)]
+    unmix = base.matte is None
+    new = Occlusion(own, left, box, within(mask, cell, part), unmix) if own or left else None
+    hidden = [(v.behind, v.behind_alpha, v.copies, v.matte) for v in (one, two)]
     if part == base.part and (holder is not None or hidden[0] == hidden[1]):
         return replace(base, cell=cell, mask=mask, cuts=new)
     if any(any(own) for own in hidden):

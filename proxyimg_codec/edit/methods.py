@@ -237,6 +237,10 @@ class Editable(Generic[Edited]):
         """
         return self._edited("merge", other=other)
 
+    def completed(self) -> Edited:
+        """Lets the hidden parts of the layer copy places of it that suit; nothing is encoded."""
+        return self._edited("complete")
+
     def duplicated(self, name: str | None = None) -> Edited:
         """Puts a copy in front of the layer, which shares its texture."""
         return self._edited("duplicate", name=name)

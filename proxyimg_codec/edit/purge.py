@@ -103,7 +103,7 @@ def _shown(picture: Picture) -> dict[Planes, NDArray[np.bool_]]:
         x, y, width, height = view.part
         for planes in view.sources:
             shown = found.setdefault(planes, np.zeros(planes.size[::-1], bool))
-            if planes in (view.behind, view.behind_alpha):
+            if planes in (view.behind, view.behind_alpha, view.matte):
                 shown[:] = True  # whatever moves, they are seen
                 continue
             shown[y : y + height, x : x + width] |= True if view.shown is None else view.shown

@@ -7,6 +7,8 @@ from dataclasses import replace
 
 from ..errors import UsageError
 from ..model import Layer, Picture
+from ..texture.implicit import Box
+from ..texture.pyramid import PyramidTexture, Texture
 from .operations import (
     changed,
     checked_name,
@@ -17,6 +19,7 @@ from .operations import (
     shown_together,
     substituted,
 )
+from .regions import extent
 from .transforms import TARGET
 
 ONE = "layer: a layer's name or position"
@@ -28,8 +31,35 @@ def remove(picture: Picture, layer: str | int) -> Picture:
     gone = {v.name for v in shown_together(picture, layer)}
     if isinstance(layer, str) and layer in picture.groups:
         gone |= {name for name in picture.groups if _within(picture, name, layer)}
-    kept = [v for v in picture.layers if v.name not in gone]
-    return _without(picture, kept, gone)
+    return _without(picture, _bared(picture, gone), gone)
+
+
+def _bared(picture: Picture, gone: set[str]) -> list[Layer]:
+    """Layers without those that are gone; soft ones in front of one are soft for ever.
+
+    Their raster at rest has its colours mixed in, and a file does not tell that it was there.
+    """
+    new: dict[Texture, Texture] = {}
+    for i, layer in enumerate(picture.layers):
+        view = layer.texture
+        if not isinstance(view, PyramidTexture) or view.matte is None or view.cuts is None:
+            continue
+        behind = (v for v in picture.layers[:i] if v.name in gone)
+        if any(_meet(extent(v.boundary, picture.size), view.cuts.box) for v in behind):
+            cuts = replace(view.cuts, own=None) if view.cuts.fronts else None
+            new[view] = replace(view, cuts=cuts)
+    return [
+        replace(v, texture=new.get(v.texture, v.texture))
+        for v in picture.layers
+        if v.name not in gone
+    ]
+
+
+def _meet(one: Box, other: Box) -> bool:
+    """Whether two rectangles x, y, width, height have a pixel in common."""
+    return all(
+        max(one[k], other[k]) < min(one[k] + one[k + 2], other[k] + other[k + 2]) for k in (0, 1)
+    )
 
 
 def _without(picture: Picture, layers: Sequence[Layer], gone: set[str]) -> Picture:

@@ -67,9 +67,9 @@ def encode(
             type is white, bool, or floating point in 0..1.
         settings: Settings of the encoder; by default ``Settings()``.
         masks: Layers given by the user, back to front; by default the encoder finds layers itself.
-            A list of arrays [H, W] (bool, 0 and 1, 0..255, or floats in 0..1, cut at one half) or
-            of regions, a dict of arrays by name, an array [N, H, W], or one array [H, W] of labels
-            0, 1, 2, ... of which 0 is the back.
+            A list of arrays [H, W] (bool, 0 and 1, 0..255, or floats in 0..1; `settings.matte` says
+            what becomes of soft ones) or of regions, a dict of arrays by name, an array [N, H, W],
+            or one array [H, W] of labels 0, 1, 2, ... of which 0 is the back.
         blocks: Metadata blocks to carry: ``icc`` and ``cicp``, which say what colours these are,
             ``exif`` and ``xmp``; `io.raster.read` gives those of a file.
         behind: The picture without its objects, as `pixels`, of the same size and colours, and

@@ -41,6 +41,7 @@ TEXTURES = ("auto", "implicit", "pyramid")
 TUNES = ("mse", "ms-ssim")
 SAMPLINGS = ("direct", "node")
 BOUNDARIES = ("lsq", "chamfer")
+MATTES = ("auto", "hard", "soft")
 BACKGROUNDS = ("auto", "smooth", "exemplar", "complete", "none")
 
 
@@ -77,6 +78,10 @@ class Settings:
             learns nothing, so that decoders fill it. Anything else is an inpainter that makes what
             is hidden of the back layer, as ``auto`` does for others: a plug-in of the kind
             `inpainters`, or a model as for `segmenter`; pyramid only.
+        matte: What becomes of masks that are soft, such as those of hair: ``soft`` keeps the alpha
+            of these layers, and finds that of all others from the colours along their outlines;
+            ``hard`` cuts them at one half; ``auto`` keeps it where the mask has a soft rim that is
+            wider than antialiasing, in opaque pictures with pyramids.
         mesh: Name of the mesher, see `plugins`; ``none`` stores no meshes, and edits make them when
             needed; None = delaunay for implicit textures, else none.
         seed: Seed of all random numbers, 0..2**32 - 1.
@@ -102,6 +107,7 @@ class Settings:
     sampling: str = "direct"
     boundary: str = "lsq"
     background: str = "auto"
+    matte: str = "auto"
     mesh: str | None = None
     seed: int = 0
     jobs: int = 2
@@ -136,6 +142,7 @@ class Settings:
                 "background",
                 f"{', '.join(BACKGROUNDS)} or an inpainter",
             ),
+            (self.matte in MATTES, "matte", " or ".join(MATTES)),
             (0 <= self.seed < 1 << 32, "seed", "0..2^32-1"),
             (self.jobs >= 1, "jobs", "at least 1"),
             (self.device in ("cpu", "cuda"), "device", "cpu or cuda"),
@@ -159,6 +166,7 @@ class Settings:
         if len(aims) > 1:
             raise UsageError(f"{' and '.join(aims)} contradict each other")
         aims += ["tune ms-ssim"] if self.tune != "mse" else []
+        aims += ["matte soft"] if self.matte == "soft" else []
         chosen = self.background == "exemplar" or self.inpainter is not None
         aims += [f"background {self.background}"] if chosen else []
         only = self._implicit_alone()

@@ -14,14 +14,37 @@ from pathlib import Path
 from typing import BinaryIO, TextIO
 
 from ..errors import InputError, PxiError
+from .streams import (
+    Readable,
+    Writable,
+    is_readable,
+    is_url,
+    is_writable,
+    name_of,
+    read_stream,
+    read_url,
+    write_stream,
+    write_url,
+)
+
+Name = str | os.PathLike[str]
 
 
-def read_bytes(path: str | os.PathLike[str]) -> bytes:
-    """Reads all bytes of a file; ``-`` is standard input.
+def read_bytes(path: Name | Readable) -> bytes:
+    """Reads all bytes of a file.
+
+    Args:
+        path: Path of the file, ``-`` for standard input; a URL; or a file that is open in binary.
 
     Raises:
         InputError: The file cannot be read.
+        UnsupportedError: A URL needs a package that is not installed.
+        UsageError: An open file gives text.
     """
+    if is_readable(path):
+        return read_stream(path)
+    if is_url(path):
+        return read_url(str(path))
     try:
         if os.fspath(path) == "-":
             return _standard(sys.stdin).read()
@@ -30,16 +53,18 @@ def read_bytes(path: str | os.PathLike[str]) -> bytes:
         raise InputError(f"{_name(path, 'input')}: cannot be read: {error.strerror}") from None
 
 
-def _name(path: str | os.PathLike[str], kind: str) -> str:
+def _name(path: Name | Readable, kind: str) -> str:
+    if is_readable(path):
+        return name_of(path)
     return f"standard {kind}" if os.fspath(path) == "-" else os.fspath(path)
 
 
 @contextmanager
-def naming(path: str | os.PathLike[str], kind: type[PxiError] = PxiError) -> Iterator[None]:
+def naming(path: Name | Readable, kind: type[PxiError] = PxiError) -> Iterator[None]:
     """Context in which errors about the content of an input begin with its name.
 
     Args:
-        path: Path of the file; ``-`` is standard input.
+        path: The file, as for `read_bytes`.
         kind: Class of the errors that are about the content.
     """
     place = f"{_name(path, 'input')}: "
@@ -66,7 +91,23 @@ def temporary_name() -> str:
     return f".pxi-{secrets.token_hex(8)}"
 
 
-def write_atomically(path: str | os.PathLike[str], data: bytes) -> None:
+def write_bytes(path: Name | Writable, data: bytes) -> None:
+    """Writes a whole file to a path, as `write_atomically`, to a URL, or to an open file.
+
+    Raises:
+        InputError: The file cannot be written.
+        UnsupportedError: A URL needs a package that is not installed.
+        UsageError: An open file takes text.
+    """
+    if is_writable(path):
+        write_stream(path, data)
+        return
+    place = write_url(str(path), data) if is_url(path) else path
+    if place is not None:
+        write_atomically(place, data)
+
+
+def write_atomically(path: Name, data: bytes) -> None:
     """Writes a file under a temporary name in its folder, and then renames it.
 
     A symbolic link stays a link. Pipes and devices are written to directly. ``-`` is standard

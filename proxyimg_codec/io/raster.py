@@ -102,8 +102,8 @@ def parse(data: bytes, name: str, *, frame: int | None = None, clip: bool = Fals
     count = source.frames + len(more)
     if count > 1 and frame is None:
         notes.insert(0, _which(source.frame, count))
-    turned = _turn(pixels, _orientation(data, told, source))
-    return Picture(_clipped(turned, clip), {**metadata.upright(told), **blocks}, tuple(notes))
+    upright = turned(pixels, _orientation(data, told, source))
+    return Picture(_clipped(upright, clip), {**metadata.upright(told), **blocks}, tuple(notes))
 
 
 def _orientation(data: bytes, told: Mapping[str, bytes], source: oiio.Source) -> int:
@@ -193,7 +193,7 @@ def _read_npy(data: bytes, name: str) -> Pixels:
         raise InputError(f"{name}: {error}") from None
 
 
-def _turn(pixels: Pixels, orientation: int) -> Pixels:
+def turned(pixels: Pixels, orientation: int) -> Pixels:
     """Applies an EXIF orientation (1..8; others count as 1)."""
     if orientation in (5, 6, 7, 8):
         pixels = pixels.transpose(1, 0, 2)

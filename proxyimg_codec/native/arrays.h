@@ -5,6 +5,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "level.h"
+
+namespace PXI_LEVEL {
+
 struct Coded {  // a stream and where its symbols go
     const uint16_t *words;
     int64_t n_words;
@@ -78,3 +82,5 @@ static int64_t decode_symbols(const Coded &s) {
     }
     return next;
 }
+
+}  // namespace PXI_LEVEL

@@ -4,6 +4,8 @@
 #include "laplace.h"
 #include "linear.h"
 
+namespace PXI_LEVEL {
+
 struct ContextNet {  // of one level: weights [out][in].., as in texture/registered_model.py
     const int32_t *first, *first_bias, *second, *second_bias, *causal, *mix, *mix_bias, *luma, *luma_bias,
         *from_luma, *from_luma_bias, *chroma, *chroma_bias;
@@ -25,6 +27,36 @@ struct Level {
     int32_t *latents;        // [9][height][width], 0
     int (*watch)(int done, int all);  // hears of progress, and stops the work by a 1; or null
 };
+
+struct Lowest {  // planes, decoded by ascending x + y
+    Tables tables;
+    Source source;
+    int32_t scales[3], count, height, width;
+    int32_t *out;  // [count][height][width], 0
+};
+
+inline Wrong decode_lowest(Lowest &s) {
+    Sink sink{};
+    LatentCoder coder{s.tables, s.source, sink};
+    const int h = s.height, w = s.width;
+    std::vector<Symbol> symbols;
+    for (int t = 0; t < h + w - 1; t++) {
+        const int first = std::max(t - w + 1, 0), last = std::min(t, h - 1);
+        symbols.clear();
+        for (int i = first; i <= last; i++)
+            for (int c = 0; c < s.count; c++) {
+                const int32_t *here = s.out + ((int64_t)c * h + i) * w + t - i;
+                const int up = i ? here[-w] : 0, left = t > i ? here[-1] : 0;
+                symbols.push_back(coder.located((i && t > i ? 8 : 16) * (up + left), s.scales[c]));
+            }
+        if (const Wrong wrong = coder.decode(symbols)) return wrong;
+        const Symbol *next = symbols.data();
+        for (int i = first; i <= last; i++)
+            for (int c = 0; c < s.count; c++, next++)
+                s.out[((int64_t)c * h + i) * w + t - i] = next->row < 0 ? 0 : (int32_t)next->value;
+    }
+    return NOTHING;
+}
 
 typedef Linear<Whole, 2> Layer;
 typedef Layer::Sums Sums;
@@ -68,11 +100,14 @@ class LevelCoder {
     int16_t squash[FAR + 1];
     std::vector<int16_t> inputs, rows;   // three rows [w + 2][12], [w + 2][width]
     std::vector<int16_t> ahead, seen;    // [h][w][width], [h + 2][pitch][18]
-    // Of a wave: positions (ys[i], wave - 3 ys[i]), activations [width], features, outputs.
+    std::vector<uint8_t> busy;           // [h + 2][pitch] whether a latent is not 0
+    // Of a wave: positions (ys[i], wave - 3 ys[i]), activations [width], features, outputs, latents [9],
+    // and which positions are not quiet.
     int at;
-    std::vector<int32_t> ys, outputs;
+    std::vector<int32_t> ys, outputs, found, loud;
     std::vector<int16_t> z, mixed, features;
-    std::vector<Symbol> symbols;
+    std::vector<Symbol> symbols;         // those that are not certain
+    std::vector<int32_t> places;         // in `found` of their values
 
     // 32 x / (1 + x / 4) for x = numerator / unit >= 0.
     static int squashed(int numerator, int unit) {
@@ -83,7 +118,21 @@ class LevelCoder {
     int16_t log_feature(int v) const { return (int16_t)s.logs[std::min<int64_t>(std::abs(v), s.n_logs - 1)]; }
     int64_t index(int i) const { return (int64_t)ys[i] * w + at - 3 * ys[i]; }
     int16_t *own(int i) { return z.data() + (int64_t)i * width; }
-    int16_t *place(int i) { return seen.data() + 18 * ((ys[i] + 2) * pitch + at - 3 * ys[i] + 2); }
+    int64_t padded(int i) const { return (ys[i] + 2) * pitch + at - 3 * ys[i] + 2; }
+    int16_t *place(int i) { return seen.data() + 18 * padded(i); }
+
+    // Whether all latents that the causal layer sees are 0, so that it adds nothing.
+    bool quiet(int i) const {
+        const uint8_t *here = busy.data() + padded(i);
+        uint64_t up, above;
+        uint16_t left;
+        std::memcpy(&up, here - 2 * pitch - 2, 8), std::memcpy(&above, here - pitch - 2, 8);
+        std::memcpy(&left, here - 2, 2);
+        const uint8_t five[8] = {1, 1, 1, 1, 1};
+        uint64_t mask;
+        std::memcpy(&mask, five, 8);
+        return !(((up | above) & mask) | left);
+    }
 
     // A row of inputs.
     void read(int y, int16_t *to) const {
@@ -144,11 +193,19 @@ class LevelCoder {
     Wrong wave() {
         const int n = (int)ys.size();
         const auto mine = [&](int i) { return own(i); };
-        causal(n, [&](int i) { return place(i); }, [&](int i, int o, Sums v) {
+        const auto begin = [&](int i, int o, Sums v) {
             const Sums more = get(ahead.data() + index(i) * width + o);
-            v = scaled(v, s.net.causal_bits);
             for (int k = 0; k < 2; k++) v.v[k] = (v.v[k] + more.v[k] + 4) >> 3;
             put(own(i) + o, v, 0, 255);
+        };
+        loud.clear();
+        for (int i = 0; i < n; i++)
+            if (!quiet(i))
+                loud.push_back(i);
+            else
+                for (int o = 0; o < width; o += Layer::UNIT) begin(i, o, {});
+        causal((int)loud.size(), [&](int k) { return place(loud[k]); }, [&](int k, int o, Sums v) {
+            begin(loud[k], o, scaled(v, s.net.causal_bits));
         });
         mix(n, mine, [&](int i, int o, Sums v) {
             put(mixed.data() + (int64_t)i * width + o, scaled(v, s.net.mix_bits), 0, 255);
@@ -165,14 +222,19 @@ class LevelCoder {
             });
             if (const Wrong wrong = coded(chroma, s.net.chroma_bits, 3, 6, s.shifts[1])) return wrong;
         }
-        for (int i = 0; i < n; i++) described(place(i), i, 9);
+        for (int i = 0; i < n; i++) {
+            const int32_t *own = found.data() + 9 * i;
+            if (std::all_of(own, own + 9, [](int32_t v) { return v == 0; })) continue;
+            described(place(i), i, 9);
+            busy[padded(i)] = 1;
+        }
         return NOTHING;
     }
 
     // Two features each of the first `count` latents of a position.
     void described(int16_t *to, int i, int count) const {
         for (int c = 0; c < count; c++) {
-            const int32_t v = s.latents[c * size + index(i)];
+            const int32_t v = found[9 * i + c];
             to[c] = feature(v), to[count + c] = log_feature(v);
         }
     }
@@ -183,26 +245,31 @@ class LevelCoder {
         layer(n, [&](int i) { return own(i); }, [&](int i, int o, Sums v) {
             std::memcpy(outputs.data() + (int64_t)i * stride + o, &v, sizeof v);
         });
-        symbols.clear();
-        for (int i = 0; i < n; i++)
+        symbols.clear(), places.clear();
+        for (int i = 0; i < n; i++) {
+            const int bands = s.bands[index(i)];
             for (int c = 0; c < count; c++) {
+                found[9 * i + from + c] = 0;
+                if (!(bands >> c % 3 & 1)) continue;
                 const int32_t *out = outputs.data() + (int64_t)i * stride + c;
                 const int mean = (out[0] + (1 << bits >> 1)) >> bits;
                 const int scale = ((out[count] + (1 << bits)) >> (bits + 1)) + 32 + shift;
-                // Scale and mean 0 make a latent certain: bands that are not there have no symbols.
-                const int there = s.bands[index(i)] >> c % 3 & 1;
-                symbols.push_back(coder.located(there * std::clamp(mean, -(1 << 14), 1 << 14),
-                                                there * std::clamp(scale, 0, s.tables.scales - 1)));
+                const Symbol symbol = coder.located(std::clamp(mean, -(1 << 14), 1 << 14),
+                                                    std::clamp(scale, 0, s.tables.scales - 1));
+                if (symbol.row < 0) continue;
+                symbols.push_back(symbol), places.push_back(9 * i + from + c);
                 if (s.given) symbols.back().value = s.given[(from + c) * size + index(i)];
             }
+        }
         if (s.given)
             coder.encode(symbols);
         else if (const Wrong wrong = coder.decode(symbols))
             return wrong;
-        const Symbol *next = symbols.data();
-        for (int i = 0; i < n; i++)
-            for (int c = 0; c < count; c++, next++)
-                s.latents[(from + c) * size + index(i)] = next->row < 0 ? 0 : (int32_t)next->value;
+        for (size_t k = 0; k < symbols.size(); k++)
+            if (const int32_t value = (int32_t)symbols[k].value) {  // they are 0 already
+                found[places[k]] = value;
+                s.latents[places[k] % 9 * size + index(places[k] / 9)] = value;
+            }
         return NOTHING;
     }
 
@@ -219,10 +286,10 @@ class LevelCoder {
           luma({{0, width}}, 6, s.net.luma_bias),
           from_luma({{0, 6}}, hidden, s.net.from_luma_bias, half(s.net.from_luma_bits)),
           chroma({{0, width}}, 12, s.net.chroma_bias), inputs(3 * in_row), rows(3 * row),
-          ahead(size * width), seen((h + 2) * pitch * 18) {
+          ahead(size * width), seen((h + 2) * pitch * 18), busy((h + 2) * pitch + 8) {
         const ContextNet &n = s.net;
         const size_t most = std::min(h, (w + 2) / 3);  // positions of a wave
-        z.resize(most * width), mixed.resize(most * width), features.resize(most * 6);
+        z.resize(most * width), mixed.resize(most * width), features.resize(most * 6), found.resize(most * 9);
         outputs.resize(most * chroma.outputs());
         for (int v = 0; v <= FAR; v++) squash[v] = (int16_t)squashed(v, 1);
         for (int o = 0; o < hidden; o++) {
@@ -254,3 +321,5 @@ class LevelCoder {
         return NOTHING;
     }
 };
+
+}  // namespace PXI_LEVEL

@@ -6,6 +6,10 @@
 #include <cstdlib>
 #include <vector>
 
+#include "level.h"
+
+namespace PXI_LEVEL {
+
 struct Cover {                  // what chords leave in a rectangle of pixels
     int64_t width, height;
     int64_t work, most;         // pieces of chords so far, and how many there may be
@@ -89,3 +93,5 @@ inline bool coverage(Cover &to, const int64_t *segments, const int64_t *log2, in
     }
     return true;
 }
+
+}  // namespace PXI_LEVEL

@@ -1,32 +1,48 @@
-// The functions of the kernel that Python calls (kernel.py and the modules ..._native.py). All is one
-// translation unit: each header does one thing, and says which module of the package is its judge.
-// Decoding needs none of train.h and what only that includes.
+// The functions of the core that decoding and entropy coding need; train.cpp has those of training.
+// Python calls them in kernel.py and the modules ..._native.py. Each header does one thing, and says
+// which module of the package is its judge. Compiled once for each level, with sums as they stand here
+// (setup.py): so all levels give the same pixels.
 
 #include <algorithm>
 #include <cstdint>
 #include <new>
 
 #include "arrays.h"
+#include "completion.h"
 #include "context.h"
 #include "coverage.h"
+#include "finish.h"
+#include "level.h"
+#include "lifting.h"
 #include "network.h"
 #include "sample.h"
 #include "synthesis.h"
-#include "train.h"
 
+using namespace PXI_LEVEL;
+
+#pragma GCC visibility push(default)
 extern "C" {
 
 // Decodes an array; see `decode_symbols`.
-int64_t pxi_decode(const Coded *stream) { return decode_symbols(*stream); }
+int64_t PXI(decode)(const Coded *stream) { return decode_symbols(*stream); }
 
 // Words that encoding gives, at the back of `words`; see `rans_encode`.
-int64_t pxi_rans_encode(const uint16_t *start, const uint16_t *freq, const int64_t *ends, int64_t groups,
+int64_t PXI(rans_encode)(const uint16_t *start, const uint16_t *freq, const int64_t *ends, int64_t groups,
                         int32_t scale_bits, int32_t lanes, uint32_t *states, uint16_t *words) {
     return rans_encode(start, freq, ends, groups, scale_bits, lanes, states, words);
 }
 
+// Decodes the lowest planes of a pyramid; what went wrong, if anything.
+int PXI(pyramid_lowest)(Lowest *planes) {
+    try {
+        return decode_lowest(*planes);
+    } catch (const std::bad_alloc &) {
+        return NO_MEMORY;
+    }
+}
+
 // Codes a level of a pyramid; what went wrong, if anything.
-int pxi_pyramid_level(Level *level) {
+int PXI(pyramid_level)(Level *level) {
     try {
         return LevelCoder(*level).run();
     } catch (const std::bad_alloc &) {
@@ -34,8 +50,18 @@ int pxi_pyramid_level(Level *level) {
     }
 }
 
+// Planes that bands give by the plain wavelet; what went wrong, if anything.
+int PXI(next_plain)(const Plain *planes) {
+    try {
+        Lifting(*planes).run();
+        return NOTHING;
+    } catch (const std::bad_alloc &) {
+        return NO_MEMORY;
+    }
+}
+
 // Synthesis of a level of a pyramid; what went wrong, if anything.
-int pxi_pyramid_synthesis(const Synthesis *level) {
+int PXI(pyramid_synthesis)(const Synthesis *level) {
     try {
         return Synthesizer(*level).run();
     } catch (const std::bad_alloc &) {
@@ -44,7 +70,7 @@ int pxi_pyramid_synthesis(const Synthesis *level) {
 }
 
 // Network output of `n` entries: out is [n][channels].
-void pxi_forward(const Net *net, const float *codes, const float *weights, const Entries *entries, int64_t n,
+void PXI(forward)(const Net *net, const float *codes, const float *weights, const Entries *entries, int64_t n,
                  float *out) {
     Block block(*net);
     for (int64_t a = 0; a < n; a += BLOCK) {
@@ -58,27 +84,59 @@ void pxi_forward(const Net *net, const float *codes, const float *weights, const
 }
 
 // Samples at points, see `sample`; `channels` is 3 or 4.
-void pxi_sample(const float *samples, int64_t stride, int32_t channels, const Points *at, float *out) {
+void PXI(sample)(const float *samples, int64_t stride, int32_t channels, const Points *at, float *out) {
     if (channels == 3)
         sample<3>(samples, stride, *at, out);
     else
         sample<4>(samples, stride, *at, out);
 }
 
+// Colours of n samples of planes; see `coloured`.
+void PXI(coloured)(const float *planes, const float *colours, int64_t n, float *out) {
+    coloured(planes, colours, n, out);
+}
+
 // Coverage of pixels; 0 where there are too many pieces, see `coverage`.
-int pxi_coverage(Cover *to, const int64_t *segments, const int64_t *log2, int64_t n) {
+int PXI(coverage)(Cover *to, const int64_t *segments, const int64_t *log2, int64_t n) {
     return coverage(*to, segments, log2, n);
 }
 
+// Fills the unknown values of a plane; see `Diffusion`.
+int PXI(diffused)(const Plane *plane, const uint8_t *done) {
+    try {
+        Diffusion().run(*plane, done);
+        return NOTHING;
+    } catch (const std::bad_alloc &) {
+        return NO_MEMORY;
+    }
+}
+
+// Completes a plane by references; see `complete`.
+int PXI(completed)(Copies *copies) {
+    try {
+        complete(*copies);
+        return NOTHING;
+    } catch (const std::bad_alloc &) {
+        return NO_MEMORY;
+    }
+}
+
 // Puts colours behind what is there; see `blend`.
-void pxi_blend(float *result, float *clear, const float *colour, const float *coverage, int64_t n) {
+void PXI(blend)(float *result, float *clear, const float *colour, const float *coverage, int64_t n) {
     blend(result, clear, colour, coverage, n);
 }
 
-// Takes `steps` steps of training; `pixels` is [steps][batch]. Returns their mean loss.
-double pxi_train(const Train *task, const int32_t *pixels, int64_t steps, int64_t batch, int64_t done,
-                 const float *lr_codes, const float *lr_weights) {
-    return Training(*task, {pixels, steps, batch, done, lr_codes, lr_weights}).run();
+// Colours of n outputs; see `premultiplied`.
+void PXI(premultiplied)(const float *output, int32_t channels, int64_t n, float *out) {
+    premultiplied(output, channels, n, out);
+}
+
+// Output samples of `bits` 8 or 16; see `finished`.
+void PXI(finished)(const float *samples, int32_t channels, int64_t n, int32_t components, int32_t bits, void *out) {
+    if (bits == 8)
+        finished(samples, channels, n, components, 255, (uint8_t *)out);
+    else
+        finished(samples, channels, n, components, 65535, (uint16_t *)out);
 }
 
 }  // extern "C"

@@ -2,7 +2,8 @@
 
 A kernel function whose structure only one module needs is called in that module:
 `texture.context_native`, `texture.synthesis_native`, `encoder.implicit.fit_native`. The kernel is
-optional: `available()` is False if the package was installed without a C++ compiler.
+optional: `available()` is False if the package was installed without a C++ compiler. Which of its
+levels runs is chosen in `levels`.
 
 Arrays must be contiguous and have the stated type, unless a function says otherwise: the kernel
 gets their addresses. Every function here needs the kernel to be available.
@@ -12,18 +13,17 @@ from __future__ import annotations
 
 import ctypes as ct
 import functools
-import importlib.machinery
-import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FormatError
+from . import levels
 
 
 class Net(ct.Structure):
@@ -73,43 +73,41 @@ _ADDRESS, _INT, _LONG = ct.c_void_p, ct.c_int32, ct.c_int64
 _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "pxi_decode": (_LONG, [ct.POINTER(Coded)]),
     "pxi_rans_encode": (_LONG, [*(_ADDRESS,) * 3, _LONG, _INT, _INT, _ADDRESS, _ADDRESS]),
+    "pxi_pyramid_lowest": (ct.c_int, [_ADDRESS]),
     "pxi_pyramid_level": (ct.c_int, [_ADDRESS]),
     "pxi_pyramid_synthesis": (ct.c_int, [_ADDRESS]),
+    "pxi_next_plain": (ct.c_int, [_ADDRESS]),
     "pxi_forward": (
         None, [ct.POINTER(Net), _ADDRESS, _ADDRESS, ct.POINTER(Entries), _LONG, _ADDRESS],
     ),
     "pxi_sample": (None, [_ADDRESS, _LONG, _INT, ct.POINTER(Points), _ADDRESS]),
+    "pxi_coloured": (None, [_ADDRESS, _ADDRESS, _LONG, _ADDRESS]),
     "pxi_coverage": (ct.c_int, [ct.POINTER(Cover), _ADDRESS, _ADDRESS, _LONG]),
+    "pxi_diffused": (ct.c_int, [_ADDRESS, _ADDRESS]),
+    "pxi_completed": (ct.c_int, [_ADDRESS]),
     "pxi_blend": (None, [*(_ADDRESS,) * 4, _LONG]),
+    "pxi_premultiplied": (None, [_ADDRESS, _INT, _LONG, _ADDRESS]),
+    "pxi_finished": (None, [_ADDRESS, _INT, _LONG, _INT, _INT, _ADDRESS]),
     "pxi_train": (ct.c_double, [*(_ADDRESS,) * 2, *(_LONG,) * 3, *(_ADDRESS,) * 2]),
 }  # fmt: skip
 """Types of result and arguments of each function; structures of other modules are addresses."""
 
 
 @functools.cache
-def library() -> ct.CDLL | None:
-    """Loads the kernel; None if it was not built or does not load on this machine.
+def library() -> SimpleNamespace | None:
+    """Functions of the kernel for this processor, by their names in `_SIGNATURES`.
 
-    The environment variable PROXYIMG_NO_KERNEL switches it off; then numpy and torch do its work.
+    None if the kernel was not built, does not load on this machine, or is switched off
+    (`levels.chosen`); then numpy and torch do its work.
     """
-    if os.environ.get("PROXYIMG_NO_KERNEL"):
+    lib, level, _ = levels.chosen()
+    if lib is None:
         return None
-    for suffix in importlib.machinery.EXTENSION_SUFFIXES:
-        path = Path(__file__).with_name("_kernel" + suffix)
-        if path.exists():
-            return _loaded(path)
-    return None
-
-
-def _loaded(path: Path) -> ct.CDLL | None:
-    try:
-        lib = ct.CDLL(str(path))
-    except OSError:
-        return None
+    functions = {}
     for name, (result, arguments) in _SIGNATURES.items():
-        function = getattr(lib, name)
+        function = functions[name] = getattr(lib, f"{name}_{level}")
         function.restype, function.argtypes = result, arguments
-    return lib
+    return SimpleNamespace(**functions)
 
 
 _allowed = ContextVar("_allowed", default=True)
@@ -224,6 +222,23 @@ def sample(
     out = np.empty((len(first), channels), np.float32)
     at = Points(pointer(first), pointer(fx), pointer(fy), len(first))
     lib.pxi_sample(pointer(samples), stride, channels, ct.byref(at), pointer(out))
+    return out
+
+
+def coloured(planes: NDArray[np.float32], colours: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Colours of planes, as `texture.synthesis` computes them in numpy.
+
+    Args:
+        planes: float32 [h, w, 3] planes.
+        colours: float32 [3, 3] weights of the planes in each component.
+
+    Returns:
+        float32 [h, w, 3] samples in 0..255, not clipped.
+    """
+    lib = library()
+    assert lib is not None, "check available() first"
+    out, colours = np.empty_like(planes), np.ascontiguousarray(colours)
+    lib.pxi_coloured(pointer(planes), pointer(colours), planes.size // 3, pointer(out))
     return out
 
 

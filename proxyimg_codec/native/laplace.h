@@ -7,6 +7,10 @@
 #include <cstdlib>
 #include <vector>
 
+#include "level.h"
+
+namespace PXI_LEVEL {
+
 struct Tables {  // of entropy/laplace.py
     const uint16_t *ends;   // [rows][columns] cumulative frequencies
     const int64_t *reach;   // [rows]
@@ -149,3 +153,5 @@ static int64_t rans_encode(const uint16_t *start, const uint16_t *freq, const in
     }
     return n - next;
 }
+
+}  // namespace PXI_LEVEL

@@ -6,11 +6,14 @@
 #include <cstring>
 #include <vector>
 
+#include "level.h"
 #include "vectors.h"
 
 #if defined(__SSE2__)
 #include <immintrin.h>
 #endif
+
+namespace PXI_LEVEL {
 
 // Whole numbers: int16 inputs and weights, taken two at a time by the machine's multiply-add of
 // pairs, where it has one.
@@ -119,3 +122,5 @@ template <class Kind, int V> class Linear {
         for (int p = 0; p < TILE; p++) out[p] = sums[p];
     }
 };
+
+}  // namespace PXI_LEVEL

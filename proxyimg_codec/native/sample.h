@@ -1,9 +1,13 @@
-// Cubic interpolation of a raster, texture/pyramid.py, and compositing, render/compose.py; numpy is
-// their judge, within rounding.
+// Colours of a raster, texture/synthesis.py, its cubic interpolation, texture/pyramid.py, and compositing,
+// render/compose.py; numpy is their judge, within rounding.
 #pragma once
 
 #include <algorithm>
 #include <cstdint>
+
+#include "level.h"
+
+namespace PXI_LEVEL {
 
 struct Points {               // of n points
     const int32_t *first;     // sample up and left of the four by four that count
@@ -34,6 +38,15 @@ template <int C> void sample(const float *samples, int64_t stride, const Points 
     }
 }
 
+// Samples [n][3] in 0..255 of planes [n][3]; `colours` is [3][3].
+inline void coloured(const float *planes, const float *colours, int64_t n, float *out) {
+    for (int64_t k = 0; k < 3 * n; k += 3)
+        for (int c = 0; c < 3; c++) {
+            const float *w = colours + 3 * c;
+            out[k + c] = planes[k] * w[0] + planes[k + 1] * w[1] + planes[k + 2] * w[2] + 128;
+        }
+}
+
 // Puts n premultiplied colours [n][4], covered in part, behind what is there; coverage may be null.
 inline void blend(float *result, float *clear, const float *colour, const float *coverage, int64_t n) {
     for (int64_t k = 0; k < n; k++, result += 4, colour += 4) {
@@ -42,3 +55,5 @@ inline void blend(float *result, float *clear, const float *colour, const float 
         clear[k] *= 1 - covered * colour[3];
     }
 }
+
+}  // namespace PXI_LEVEL

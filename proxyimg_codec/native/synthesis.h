@@ -2,7 +2,10 @@
 #pragma once
 
 #include "laplace.h"
+#include "lifting.h"
 #include "linear.h"
+
+namespace PXI_LEVEL {
 
 struct Synthesis {  // of one level: weights [out][in].., as in texture/registered_model.py
     const float *linear, *first, *first_bias, *second, *second_bias, *third, *third_bias, *gain;
@@ -13,18 +16,64 @@ struct Synthesis {  // of one level: weights [out][in].., as in texture/register
     int (*watch)(int done, int all);               // as in struct Level
 };
 
+// Rows of 3 planes and 9 bands around a position. Where all the bands are 0, as in most windows of most
+// pictures, the planes alone give the same sums.
+struct Window {
+    const int side, length;          // side rows of length positions
+    std::vector<float> all, planes;  // [side][length][12], [side][length][3]
+    std::vector<uint8_t> busy, any;  // [side][length] whether a band is not 0; [length] of any row
+    std::vector<int32_t> loud, quiet;  // positions with such bands in their window, and the others
+
+    Window(int side, int length)
+        : side(side), length(length), all((size_t)side * length * 12), planes((size_t)side * length * 3),
+          busy((size_t)side * length), any(length), loud(length), quiet(length) {}
+    float *row(int r) { return all.data() + (int64_t)r * length * 12; }
+    void up() {  // by one row
+        std::copy(all.begin() + length * 12, all.end(), all.begin());
+        std::copy(planes.begin() + length * 3, planes.end(), planes.begin());
+        std::copy(busy.begin() + length, busy.end(), busy.begin());
+    }
+    void filled(int r) {  // a row of `all`, which the others follow
+        const float *from = row(r);
+        float *to = planes.data() + (int64_t)r * length * 3;
+        for (int x = 0; x < length; x++, from += 12, to += 3) {
+            std::copy_n(from, 3, to);
+            uint64_t bands[5];  // as bits; one of the planes is passed over
+            std::memcpy(bands, from + 2, sizeof bands);
+            busy[(int64_t)r * length + x] = (bands[0] >> 32 | bands[1] | bands[2] | bands[3] | bands[4]) != 0;
+        }
+    }
+    // Calls out(x, first output, Sums) of a layer of all, or of one of planes, for n positions.
+    template <class L, class Out> void operator()(const L &of_all, const L &of_planes, int n, Out out) {
+        std::fill(any.begin(), any.end(), 0);
+        for (int r = 0; r < side; r++)
+            for (int x = 0; x < length; x++) any[x] |= busy[(int64_t)r * length + x];
+        int some = 0, none = 0;
+        for (int x = 0; x < n; x++) {
+            uint8_t near = 0;
+            for (int k = 0; k < side; k++) near |= any[x + k];
+            loud[some] = quiet[none] = x;
+            some += near, none += !near;
+        }
+        of_all(some, [&](int i) { return all.data() + 12 * loud[i]; },
+               [&](int i, int o, typename L::Sums v) { out(loud[i], o, v); });
+        of_planes(none, [&](int i) { return planes.data() + 3 * quiet[i]; },
+                  [&](int i, int o, typename L::Sums v) { out(quiet[i], o, v); });
+    }
+};
+
 class Synthesizer {
     typedef Linear<Real, 2> Hidden;
     typedef Linear<Real, LANES == 16 ? 1 : 2> Output;
 
     const Synthesis &s;
     const int h, w, width;  // hidden units with padding
-    const int64_t size, in_row, row, wide_row;
-    Hidden first, second;
-    Output third, linear;
-    // Three rows of inputs [w + 2][12], three of hidden units [w + 2][width], five of planes as the
-    // wavelet needs them [w + 4][12]; between both layers [w][width]; outputs [w].
-    std::vector<float> inputs, rows, wide, between, cells;
+    const int64_t size, row;
+    Hidden first, first_planes, second;
+    Output third, linear, linear_planes;
+    Window inputs, wide;  // of the network; as the wavelet needs them
+    // Three rows of hidden units [w + 2][width]; between both layers [w][width]; outputs [w].
+    std::vector<float> rows, between, cells;
 
     template <class L> static void put(float *to, typename L::Sums v, float least) {
         for (vec &x : v.v) x = x < least ? (vec){} + least : x;
@@ -32,18 +81,12 @@ class Synthesizer {
     }
     static float soft(float x) { return x / (1 + std::abs(x) * .125f); }
 
-    // Index into a band of a line of `size` samples, mirrored about the first and the last of them.
-    static int mirrored(int i, int size, bool high) {
-        const int count = (size + 1 - high) / 2;
-        if (i < 0) i = -i - high;
-        if (i >= count) i = size - 1 - high - i;
-        return std::clamp(i, 0, std::max(count - 1, 0));
-    }
-
-    // A row of inputs.
-    void read(int y, float *to) const {
+    // The last row of inputs.
+    void read(int y) {
+        float *to = inputs.row(2);
         if (y >= h) {
-            std::fill_n(to, in_row, 0.f);
+            std::fill_n(to, (w + 2) * 12, 0.f);
+            inputs.filled(2);
             return;
         }
         to += 12;
@@ -59,10 +102,12 @@ class Synthesizer {
             const int32_t *from = s.latents + c * size + (int64_t)y * w;
             for (int x = 0; x < w; x++) to[12 * x + 3 + c] = soft((float)from[x] * s.gain[c]);
         }
+        inputs.filled(2);
     }
 
     // A row of planes: the low bands, then the high ones.
-    void read_wide(int y, float *to) const {
+    void read_wide(int y, int r) {
+        float *to = wide.row(r);
         const float *low = s.low + (int64_t)mirrored(y, s.rows, false) * w * 3;
         for (int x = -2; x < w + 2; x++)
             std::memcpy(to + 12 * (x + 2), low + 3 * mirrored(x, s.columns, false), 12);
@@ -70,14 +115,17 @@ class Synthesizer {
             const int band = 1 + c % 3, colour = c / 3;
             const bool down = band > 1, across = band & 1;
             const int32_t *from = s.latents + c * size + (int64_t)mirrored(y, s.rows, down) * w;
-            for (int x = -2; x < w + 2; x++)
-                to[12 * (x + 2) + 3 * band + colour] = (float)from[mirrored(x, s.columns, across)] * s.gain[c];
+            float *out = to + 24 + 3 * band + colour;
+            for (int x = 0; x < w; x++) out[12 * x] = (float)from[x] * s.gain[c];
+            for (int x : {-2, -1, w - 1, w, w + 1})
+                out[12 * x] = (float)from[mirrored(x, s.columns, across)] * s.gain[c];
         }
+        wide.filled(r);
     }
 
     // Row y of the hidden units.
     void hide(float *to) {
-        first(w, [&](int x) { return inputs.data() + 12 * x; }, [&](int x, int o, Hidden::Sums v) {
+        inputs(first, first_planes, w, [&](int x, int o, Hidden::Sums v) {
             put<Hidden>(between.data() + (int64_t)x * width + o, v, 0);
         });
         second(w, [&](int x) { return between.data() + (int64_t)x * width; }, [&](int x, int o, Hidden::Sums v) {
@@ -87,7 +135,7 @@ class Synthesizer {
 
     void write(int y) {
         const int stride = linear.outputs();
-        linear(w, [&](int x) { return wide.data() + 12 * x; }, [&](int x, int o, Output::Sums v) {
+        wide(linear, linear_planes, w, [&](int x, int o, Output::Sums v) {
             std::memcpy(cells.data() + (int64_t)x * stride + o, &v, sizeof v);
         });
         third(w, [&](int x) { return rows.data() + (int64_t)x * width; }, [&](int x, int o, Output::Sums v) {
@@ -108,14 +156,18 @@ class Synthesizer {
   public:
     explicit Synthesizer(const Synthesis &level)
         : s(level), h(s.height), w(s.width), width(Hidden::padded(s.hidden)), size((int64_t)h * w),
-          in_row((w + 2) * 12), row((int64_t)(w + 2) * width), wide_row((w + 4) * 12),
-          first(square(3, 12, in_row), s.hidden, s.first_bias), second({{0, width}}, s.hidden, s.second_bias),
-          third(square(3, width, row), 12, s.third_bias), linear(square(5, 12, wide_row), 12, nullptr),
-          inputs(3 * in_row), rows(3 * row), wide(5 * wide_row), between((size_t)w * width),
-          cells((size_t)w * linear.outputs()) {
+          row((int64_t)(w + 2) * width), first(square(3, 12, (w + 2) * 12), s.hidden, s.first_bias),
+          first_planes(square(3, 3, (w + 2) * 3), s.hidden, s.first_bias),
+          second({{0, width}}, s.hidden, s.second_bias), third(square(3, width, row), 12, s.third_bias),
+          linear(square(5, 12, (w + 4) * 12), 12, nullptr),
+          linear_planes(square(5, 3, (w + 4) * 3), 12, nullptr), inputs(3, w + 2), wide(5, w + 4),
+          rows(3 * row), between((size_t)w * width), cells((size_t)w * linear.outputs()) {
         for (int o = 0; o < s.hidden; o++) {
             for (int tap = 0; tap < 9; tap++)
-                for (int i = 0; i < 12; i++) first.set(12 * tap + i, o, s.first[(o * 12 + i) * 9 + tap]);
+                for (int i = 0; i < 12; i++) {
+                    first.set(12 * tap + i, o, s.first[(o * 12 + i) * 9 + tap]);
+                    if (i < 3) first_planes.set(3 * tap + i, o, s.first[(o * 12 + i) * 9 + tap]);
+                }
             for (int i = 0; i < s.hidden; i++) second.set(i, o, s.second[o * s.hidden + i]);
         }
         for (int o = 0; o < 12; o++) {
@@ -123,28 +175,33 @@ class Synthesizer {
                 for (int i = 0; i < s.hidden; i++)
                     third.set(width * tap + i, o, s.third[(o * s.hidden + i) * 9 + tap]);
             for (int tap = 0; tap < 25; tap++)
-                for (int i = 0; i < 12; i++) linear.set(12 * tap + i, o, s.linear[(o * 12 + i) * 25 + tap]);
+                for (int i = 0; i < 12; i++) {
+                    linear.set(12 * tap + i, o, s.linear[(o * 12 + i) * 25 + tap]);
+                    if (i < 3) linear_planes.set(3 * tap + i, o, s.linear[(o * 12 + i) * 25 + tap]);
+                }
         }
     }
 
     Wrong run() {
-        float *last_in = inputs.data() + 2 * in_row, *last = rows.data() + 2 * row;
-        read(0, last_in);
-        for (int r = 0; r < 4; r++) read_wide(r - 2, wide.data() + (r + 1) * wide_row);
+        float *last = rows.data() + 2 * row;
+        read(0);
+        for (int r = 0; r < 4; r++) read_wide(r - 2, r + 1);
         for (int y = 0; y <= h; y++) {  // the hidden units are a row ahead
             if (s.watch && y % 8 == 0 && s.watch(y, h + 1)) return STOPPED;
-            std::memmove(inputs.data(), inputs.data() + in_row, 2 * in_row * sizeof(float));
+            inputs.up();
             std::memmove(rows.data(), rows.data() + row, 2 * row * sizeof(float));
-            read(y + 1, last_in);
+            read(y + 1);
             if (y < h)
                 hide(last);
             else
                 std::fill_n(last, row, 0.f);
             if (y == 0) continue;
-            std::memmove(wide.data(), wide.data() + wide_row, 4 * wide_row * sizeof(float));
-            read_wide(y + 1, wide.data() + 4 * wide_row);
+            wide.up();
+            read_wide(y + 1, 4);
             write(y - 1);
         }
         return NOTHING;
     }
 };
+
+}  // namespace PXI_LEVEL

@@ -23,7 +23,7 @@ from ..texture.network import Floats, Network
 from ..texture.occlusion import ALL_IN_PLACE, Moved
 from ..texture.planes import Planes
 from ..texture.pyramid import PyramidTexture
-from . import engines
+from . import engines, finish_native
 from .cache import SAMPLES_MAX, Cache, Sheet
 from .neighbours import moved_neighbours, present_outline
 from .progress import Progress
@@ -218,8 +218,11 @@ class _Painter:
 
     def paint(self, sheet: Sheet, box: Rectangle, at: NDArray[np.int64]) -> None:
         """Computes colours of samples of a sheet; `at` are their numbers, from `sheet.start` on."""
-        everything = len(at) == len(sheet.known)
-        sheet.colour[slice(None) if everything else at] = self._textured(box, at + sheet.start)
+        colour = self._textured(box, at + sheet.start)
+        if len(at) == len(sheet.known):
+            sheet.colour = colour
+        else:
+            sheet.colour[at] = colour
         sheet.known[at] = True
 
     def posed(self, colour: Floats) -> Floats:
@@ -320,6 +323,8 @@ def premultiplied(output: Floats) -> Floats:
         float32 [N, 4] with alpha in 0..1, which is 1 without a fourth output, and colour in
         0..alpha.
     """
+    if kernel.available():
+        return finish_native.premultiplied(output)
     result = np.empty((len(output), 4), np.float32)
     result[:, 3] = np.fmin(np.fmax(output[:, 3], 0), 1) if output.shape[1] == 4 else 1
     for k in range(3):

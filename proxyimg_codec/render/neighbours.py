@@ -79,7 +79,11 @@ def _moved(layer: Layer, layers: Sequence[Layer], home: int, drawn: frozenset[La
         {v, layer} <= drawn and v.pose.still(layer.pose) and place(v.texture, v.box) == raster
         for v in layers
     ]
-    return view.cuts.moved(home, [v.boundary for v in layers], still)
+    views = ((k, v.texture) for k, v in enumerate(layers))
+    soft = frozenset(k for k, t in views if isinstance(t, PyramidTexture) and t.matte)
+    found = view.cuts.moved(home, [v.boundary for v in layers], still, soft)
+    behind = zip(layers[: layers.index(layer)], still, strict=False)
+    return found._replace(apart=bool(view.matte) and any(v in drawn and not s for v, s in behind))
 
 
 def place(texture: Texture, box: Box) -> tuple[Planes, int, int] | None:

@@ -14,7 +14,7 @@ from ..errors import UsageError
 from ..limits import DEFAULT_LIMITS, Limits, enough_memory
 from ..model import Layer, Pictured
 from ..native import kernel
-from . import engines, thumbnail
+from . import engines, finish_native, thumbnail
 from .cache import Cache
 from .compose import compose
 from .moment import at
@@ -160,6 +160,8 @@ def _keys(layers: Sequence[str | int]) -> list[str | int]:
 
 def _finished(tile: NDArray[np.float32], solid: bool, dtype: np.dtype[Any]) -> NDArray[Any]:
     """Converts premultiplied [h, w, 4] to output samples, opaque or with straight alpha."""
+    if dtype != np.float32 and kernel.available():
+        return finish_native.finished(tile, solid, dtype)
     if not solid:
         tile = tile.copy()
         tile[..., :3] /= np.maximum(tile[..., 3:], np.float32(1e-6))

@@ -20,6 +20,8 @@ from numpy.typing import NDArray
 from ..container import texr
 from ..entropy import arrays
 from ..errors import FormatError
+from ..native import kernel
+from . import completion_native
 from .diffusion import FRACTION_BITS, Values, diffused
 from .lifts import Copier, lifts_of
 
@@ -110,6 +112,10 @@ def completed(values: Values, known: Samples, copies: Copies) -> tuple[Values, S
         int32 [C, H, W] values, and bool [H, W], True for samples known now. Both may be the
         arrays that were given.
     """
+    if kernel.available():
+        return completion_native.completed(
+            values, known, copies.grain, copies.offsets, copies.sources, DRIFT, FILL_ONE
+        )
     flat = known.ravel()
     copier = Copier(values, known, copies.offsets, copies.sources, 1 << copies.grain)
     at, base = _bases(values, known, copies, copier, lifts_of(copier))

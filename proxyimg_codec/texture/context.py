@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..entropy import laplace
+from ..native import kernel
 from ..progress import worked
-from . import registered_model
+from . import lifting_native, registered_model
 from .convolution import by_row, convolved, strips
 from .grid import Bands, Window, mirrored_indices
 from .network import Floats
@@ -95,6 +96,9 @@ def next_plain(low: Ints, high: Ints, shape: tuple[int, int]) -> Ints:
     Returns:
         int32 [3, rows, columns] in 1/16, at most `LIMIT` in magnitude.
     """
+    if kernel.available():
+        taps = np.array((LOW, HIGH), np.int32)
+        return lifting_native.next_plain(low, high, shape, taps, LIMIT << 4)
     bands = high.reshape(3, 3, *high.shape[1:]) << 4
     left = _lift(low, bands[:, 1], 1, shape[0])
     right = _lift(bands[:, 0], bands[:, 2], 1, shape[0])

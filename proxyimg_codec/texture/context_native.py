@@ -80,6 +80,18 @@ class _Level(ct.Structure):
     ]
 
 
+class _Lowest(ct.Structure):
+    """Mirrors `struct Lowest`."""
+
+    _fields_ = [
+        ("tables", _Tables),
+        ("source", _Source),
+        ("scales", ct.c_int32 * 3),
+        *((n, ct.c_int32) for n in ("count", "height", "width")),
+        ("out", ct.c_void_p),
+    ]
+
+
 def decode(at: Place, stream: rans.Decoder, escapes: bytes, used: int, out: Ints) -> int:
     """Decodes a level.
 
@@ -99,16 +111,86 @@ def decode(at: Place, stream: rans.Decoder, escapes: bytes, used: int, out: Ints
             of range.
         LimitError: The kernel cannot allocate what it needs.
     """
+    source, alive = _source(stream, escapes, used)
+    level = _run(at, None, source, _Sink(), out)
+    stream.states[:] = alive[1]
+    stream.used = level.source.used
+    return int(level.source.escapes_used)
+
+
+def decode_lowest(
+    scales: list[int], shape: tuple[int, int], stream: rans.Decoder, escapes: bytes, used: int
+) -> tuple[Ints, int]:
+    """Decodes the lowest planes, as `latents` does in numpy.
+
+    Args:
+        scales: Scale index of each of 1 to 3 planes.
+        shape: Rows and columns of the planes.
+        stream: The entropy-coded stream, which is advanced.
+        escapes: The list of escapes.
+        used: Number of bytes of `escapes` that were read before.
+
+    Returns:
+        int32 [3, h, w] planes, 0 where there is no scale, and the bytes of `escapes` read by now.
+
+    Raises:
+        FormatError: As of `decode`.
+        LimitError: The kernel cannot allocate what it needs.
+    """
+    lib = kernel.library()
+    assert lib is not None, "check available() first"
+    source, alive = _source(stream, escapes, used)
+    tables, kept = _tables()
+    out = np.zeros((3, *shape), np.int32)
+    planes = _Lowest(
+        tables, source, (ct.c_int32 * 3)(*scales), len(scales), *shape, kernel.pointer(out)
+    )
+    _check(lib.pxi_pyramid_lowest(ct.byref(planes)))
+    del kept  # alive until here
+    stream.states[:] = alive[1]
+    stream.used = planes.source.used
+    return out, planes.source.escapes_used
+
+
+Alive = tuple[NDArray[Any], ...]
+"""Arrays that a structure points to."""
+
+
+def _source(stream: rans.Decoder, escapes: bytes, used: int) -> tuple[_Source, Alive]:
     words, states = stream.words.astype(np.uint16), stream.states.astype(np.uint32)
     listed = np.frombuffer(escapes, np.uint8)
     source = _Source(
         kernel.pointer(words), kernel.pointer(states), kernel.pointer(listed),
         len(words), stream.used, len(listed), used, stream.lanes,
     )  # fmt: skip
-    level = _run(at, None, source, _Sink(), out)
-    stream.states[:] = states
-    stream.used = level.source.used
-    return int(level.source.escapes_used)
+    return source, (words, states, listed)
+
+
+def _tables() -> tuple[_Tables, Alive]:
+    tables = laplace.tables()
+    arrays = tuple(
+        np.ascontiguousarray(array, dtype)
+        for array, dtype in (
+            (tables.ends, np.uint16), (tables.reach, np.int64), (laplace.SHIFTS, np.int64),
+        )
+    )  # fmt: skip
+    found = _Tables(
+        *map(kernel.pointer, arrays),
+        laplace.WIDTH + 1, laplace.SCALES, laplace.CERTAIN, context.LIMIT, rans.SCALE_BITS,
+    )  # fmt: skip
+    return found, arrays
+
+
+def _check(wrong: int) -> None:
+    """Raises the error of what went wrong, if anything."""
+    if wrong == STREAM_ENDS:
+        raise FormatError(rans.TOO_SHORT, rule="ENT-6")
+    if wrong == ESCAPES_END:
+        raise FormatError(context.BAD_ESCAPES, rule="PYR-13")
+    if wrong == OUT_OF_RANGE:
+        raise FormatError(context.BAD_LATENT, rule="PYR-12")
+    if wrong:
+        raise LimitError("there is not enough memory to code a pyramid")
 
 
 def encode(at: Place, values: Ints, stream: rans.Encoder) -> tuple[Ints, NDArray[np.int64]]:
@@ -143,8 +225,8 @@ def _run(at: Place, values: Ints | None, source: _Source, sink: _Sink, latents: 
     assert lib is not None, "check available() first"
     coder, weights = at.coder, at.coder.weights
     h, w = at.bands.shape
-    tables = laplace.tables()
-    alive: list[NDArray[Any]] = []
+    tables, kept = _tables()
+    alive: list[NDArray[Any]] = [*kept]
 
     def address(array: NDArray[Any], dtype: type[np.generic]) -> int:
         alive.append(np.ascontiguousarray(array, dtype))
@@ -158,13 +240,7 @@ def _run(at: Place, values: Ints | None, source: _Source, sink: _Sink, latents: 
             *(-getattr(weights, n).exponent - kept for n, kept in BITS.items()),
             len(weights.mix.values),
         ),
-        _Tables(
-            address(tables.ends, np.uint16),
-            address(tables.reach, np.int64),
-            address(laplace.SHIFTS, np.int64),
-            laplace.WIDTH + 1, laplace.SCALES, laplace.CERTAIN, context.LIMIT, rans.SCALE_BITS,
-        ),
-        source, sink, h, w, coder.grey, (ct.c_int32 * 2)(*coder.shifts),
+        tables, source, sink, h, w, coder.grey, (ct.c_int32 * 2)(*coder.shifts),
         address(context.LOG, np.int32), len(context.LOG),
         address(at.low, np.int32), address(at.parent, np.int32), address(at.bands, np.uint8),
         None if values is None else address(values, np.int32),
@@ -172,12 +248,5 @@ def _run(at: Place, values: Ints | None, source: _Source, sink: _Sink, latents: 
     )  # fmt: skip
     wrong = lib.pxi_pyramid_level(ct.byref(level))
     watch.check()
-    if wrong == STREAM_ENDS:
-        raise FormatError(rans.TOO_SHORT, rule="ENT-6")
-    if wrong == ESCAPES_END:
-        raise FormatError(context.BAD_ESCAPES, rule="PYR-13")
-    if wrong == OUT_OF_RANGE:
-        raise FormatError(context.BAD_LATENT, rule="PYR-12")
-    if wrong:
-        raise LimitError("there is not enough memory to code a pyramid")
+    _check(wrong)
     return level

@@ -94,6 +94,8 @@ def code_lowest(
     Raises:
         FormatError: The stream is corrupt, or has not even the first values.
     """
+    if isinstance(coder, Decoder) and kernel.available() and not cut:
+        return coder.lowest(fields["lowest"], shape)
     h, w = shape
     scale = np.array(fields["lowest"], np.int64)
     count = len(scale)
@@ -243,6 +245,17 @@ class Decoder:
             raise FormatError(context.BAD_LATENT, rule="PYR-12")
         out[there] = off
         return out
+
+    def lowest(self, scales: list[int], shape: tuple[int, int]) -> Ints:
+        """Reads the lowest planes with the compiled kernel: int32 [3, h, w].
+
+        Raises:
+            FormatError: The stream is corrupt.
+        """
+        planes, self._at = context_native.decode_lowest(
+            scales, shape, self._stream, self._escapes, self._at
+        )
+        return planes
 
     def level(self, at: Place, out: Ints) -> None:
         """Reads a level.

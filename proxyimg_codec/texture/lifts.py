@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 LIFT = 24 << 8
-"""Largest difference that counts, in 1/256 level: what is more is no drift of light."""
+"""Largest difference that counts, in 1/256 level: what differs more is another thing."""
 
 LIFT_MOST = 32640
 """Largest lift, so that sums stay below 2^31."""
@@ -152,8 +152,12 @@ def _between(
 
 
 def _mean(differ: Values, where: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Means [C, n] of differences [C, n, h, w] over some samples, bounded, and their number."""
+    """Means [C, n] of differences [C, n, h, w] over some samples, and the number of these.
+
+    Where a component differs more than drifts of light do, nothing is compared: both are 0.
+    """
     count = where.sum((1, 2)).astype(np.int64)
     total = (differ.astype(np.int64) * where).sum((2, 3))
     mean = (2 * total + count) // np.maximum(2 * count, 1)
-    return np.clip(mean, -LIFT, LIFT), count
+    alike = (np.abs(mean) <= LIFT).all(0)
+    return mean * alike, count * alike

@@ -37,10 +37,13 @@ class Moved(NamedTuple):
         fronts: Boundaries among `Occlusion.fronts` that have moved or are gone.
         behind: Layers behind, front to back: the boundary at rest, None for the whole canvas, and
             whether it still rests in its place. Empty if all do.
+        apart: Whether the view has a matte, and something that may shine through has come to lie
+            behind its layer.
     """
 
     fronts: frozenset[Boundary] = frozenset()
     behind: tuple[tuple[Boundary | None, bool], ...] = ()
+    apart: bool = False
 
 
 class Edge(NamedTuple):
@@ -157,6 +160,7 @@ class Occlusion:
         layer: int,
         boundaries: Sequence[Boundary | None],
         still: Sequence[bool],
+        soft: frozenset[int] = frozenset(),
     ) -> Moved:
         """Finds the neighbours that have moved relative to the layer that shows the view.
 
@@ -164,13 +168,14 @@ class Occlusion:
             layer: Number of the layer for which the view was cut.
             boundaries: Boundaries of all layers at rest, back to front.
             still: For each layer, whether it rests on the layer that shows the view.
+            soft: Numbers of layers that show a matte, and so need not hide what is behind them.
         """
         found = self._matched(layer, boundaries)
         fronts = (f for f in self.fronts if f not in found or not still[found[f]])
         behind: tuple[tuple[Boundary | None, bool], ...] = ALL_REMOVED
         if self._owns(boundaries[layer]):
             below = [] if self.own is None else range(layer - 1, -1, -1)
-            behind = tuple((boundaries[k], still[k]) for k in below)
+            behind = tuple((boundaries[k], still[k]) for k in below if not (still[k] and k in soft))
             if all(rests for _, rests in behind):
                 behind = ()
         return Moved(frozenset(fronts), behind)
@@ -251,6 +256,15 @@ class Occlusion:
             return self.kept(moved)
         edge = self.edge(moved)
         return self.shown if edge is None else edge.shown
+
+    def loose(self, moved: Moved) -> Samples:
+        """Samples near others behind which something has changed, bool [height, width] [PYR-53].
+
+        These are all if no boundary of the layer itself cuts the view, or one moved behind it.
+        """
+        if self.own is None or moved.apart:
+            return np.ones(self.box[:1:-1], np.bool_)
+        return ~_eroded(~self._bared(moved))
 
     def _left(self, moved: Moved) -> Samples:
         """Samples that are not cut off fully, and not near a cut by a neighbour that has moved.
@@ -359,6 +373,8 @@ def _smooth(covered: NDArray[np.int32]) -> NDArray[np.int64]:
 
 def _eroded(samples: Samples, reach: int | None = None) -> Samples:
     """Mask eroded across and down, by default by `REACH`; True beyond the array."""
+    if samples.all():
+        return samples
     reach = REACH if reach is None else reach
     for axis, size in enumerate(samples.shape):
         beside = [(reach, reach) if k == axis else (0, 0) for k in (0, 1)]

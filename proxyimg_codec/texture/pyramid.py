@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -51,6 +51,8 @@ class PyramidTexture:
         behind_alpha: Planes of the alpha of `behind`, of the same size; None if that is opaque, or
             there is no `alpha`.
         copies: References of hidden samples to others that they copy, or None.
+        matte: Planes of the alpha that soft samples have where they do not show, of the size of
+            `part`; None if there are none. With it, `behind` is not None.
         network: Always None: no network of the file is needed.
     """
 
@@ -63,6 +65,7 @@ class PyramidTexture:
     behind: Planes | None = None
     behind_alpha: Planes | None = None
     copies: Copies | None = None
+    matte: Planes | None = None
     network: ClassVar[None] = None
 
     @property
@@ -73,18 +76,17 @@ class PyramidTexture:
 
     def channels(self, networks: Sequence[Network]) -> int:
         """Number of channels: 3, or 4 with alpha; `networks` is not used."""
-        return 3 if self.alpha is None else 4
+        return 3 if self.alpha is None and self.matte is None else 4
 
     @property
     def sources(self) -> tuple[Planes, ...]:
-        """Planes that the view needs: those of colour, alpha, `behind` and its alpha."""
-        found = (self.planes, self.alpha, self.behind, self.behind_alpha)
+        """Planes that the view needs: those of colour, alpha, `behind` and its alpha, the matte."""
+        found = (self.planes, self.alpha, self.behind, self.behind_alpha, self.matte)
         return tuple(p for p in found if p is not None)
 
     def renewed(self, new: Mapping[Planes, Planes]) -> PyramidTexture:
         """View of other planes: those that `new` has for each of `sources`."""
-        names = ("planes", "alpha", "behind", "behind_alpha")
-        own = ((name, getattr(self, name)) for name in names)
+        own = ((name, getattr(self, name)) for name in ("planes", *texr.PLANES))
         changed: dict[str, Any] = {name: new[p] for name, p in own if p is not None}
         return replace(self, **changed)
 
@@ -118,7 +120,8 @@ class PyramidTexture:
         if not mask.any():
             mask = np.logical_or.reduce(corners)
         if mask.all():
-            gone = ("behind", "behind_alpha", "copies") if cuts is None else ()
+            useless = cuts is None and self.matte is None
+            gone = ("behind", "behind_alpha", "copies") if useless else ()
             lost: dict[str, Any] = dict.fromkeys(gone)
             return replace(self, cell=0, mask=None, cuts=cuts, **lost)
         if cuts is not None:
@@ -136,14 +139,13 @@ class PyramidTexture:
         return {
             "coder": texr.PYRAMID,
             "planes": numbers[self.planes],
-            "alpha": 0 if self.alpha is None else 1 + numbers[self.alpha],
+            "alpha": 0,
             "part": list(self.part),
             "cell": self.cell if mask else 0,
             "mask": mask,
             "cuts": list(cuts),
             **texr.ABSENT,
-            "behind": 0 if self.behind is None else 1 + numbers[self.behind],
-            "behind_alpha": 0 if self.behind_alpha is None else 1 + numbers[self.behind_alpha],
+            **{k: 1 + numbers[p] for k in texr.PLANES if (p := getattr(self, k)) is not None},
             **({} if self.copies is None else self.copies.fields),
             "unmix": int(bool(cuts and self.cuts and self.cuts.own and self.cuts.unmix)),
         }
@@ -151,17 +153,39 @@ class PyramidTexture:
     @cached_property
     def shown(self) -> Samples | None:
         """Samples of the part that show if nothing has moved, bool [height, width]; None = all."""
-        if self.cuts is not None:
-            shown = self.cuts.shown
-        elif self.mask is not None:
-            shown = _samples(self.mask, self.cell, self.part)
-        else:
+        if self.cuts is None and self.mask is None and self.matte is None:
             return None
+        shown = self._present
+        if self.cuts is None or self.cuts.own is None:
+            shown = shown & ~self.soft
         return None if shown.all() else shown
 
+    @property
+    def _present(self) -> Samples:
+        """Samples that show if nothing has moved, whether they are soft or not [PYR-41]."""
+        if self.cuts is not None:
+            return self.cuts.shown
+        if self.mask is not None:
+            return _samples(self.mask, self.cell, self.part)
+        return np.ones(self.part[:1:-1], np.bool_)
+
+    @cached_property
+    def soft(self) -> Samples:
+        """Samples that have the alpha of the matte where they do not show, bool [height, width].
+
+        Raises:
+            FormatError: The support of the matte is corrupt.
+        """
+        return np.zeros(self.part[:1:-1], np.bool_) if self.matte is None else self.matte.stored
+
     def kept(self, moved: Moved) -> Samples | None:
-        """Samples of the part that show when neighbours moved, bool [height, width]; None = all."""
-        return self.shown if self.cuts is None or moved == ALL_IN_PLACE else self.cuts.seen(moved)
+        """Samples of the part that show when neighbours moved, bool [height, width]; None = all.
+
+        Soft ones near others behind which something has moved do not [PYR-53].
+        """
+        if self.cuts is None or moved == ALL_IN_PLACE:
+            return self.shown
+        return self.cuts.seen(moved) if self.matte is None else _seen(self, moved)
 
     @kernel.Computed
     def filled(self) -> NDArray[np.uint16]:
@@ -174,15 +198,14 @@ class PyramidTexture:
         Raises:
             FormatError: The planes are corrupt.
         """
-        trusted = self.shown if self.cuts is None else self.cuts.trusted
-        assert trusted is not None, "nothing is to be filled"
-        values, known = self._known(trusted)
+        trusted = self._present if self.cuts is None else self.cuts.trusted
+        values, known = self.known(trusted & ~self.soft)
         if self.copies is not None:
             values, known = completed(values, known, self.copies)
         out = diffused(values, known).astype(np.uint16)
         return np.ascontiguousarray(np.moveaxis(out, 0, 2)).reshape(-1, len(out))
 
-    def _known(self, trusted: Samples) -> tuple[Values, Samples]:
+    def known(self, trusted: Samples) -> tuple[Values, Samples]:
         """Samples that are known before any is copied or filled [PYR-42, PYR-47].
 
         Args:
@@ -293,7 +316,9 @@ class PyramidTexture:
     ) -> Floats:
         """Premultiplied samples [N, `channels`] at rows and columns [N], filled and unmixed."""
         x, y, width, _ = self.part
-        kept = None if seen else self.kept(moved)
+        # What hides samples does not hide those of soft rims, which another layer shows through.
+        kept = None if seen and self.matte is None else self.kept(moved)
+        soft = None
         window = Window(
             int(row.min()) + y, int(row.max()) + y + 1,
             int(column.min()) + x, int(column.max()) + x + 1,
@@ -315,12 +340,24 @@ class PyramidTexture:
                 colour[outside] = fill[:, :colours]
                 if alpha is not None:
                     alpha[outside] = fill[:, -1:]
+                soft = outside[self.soft.ravel().take(place[outside])]
             if self.cuts and (edge := rim(self.planes, self.alpha, self.part, self.cuts, moved)):
                 edge.put(place, colour, alpha)
+        if self.matte is not None:
+            alpha = np.ones((len(colour), 1), np.float32) if alpha is None else alpha
+            if soft is not None and len(soft):
+                alpha[soft] *= self.matte.raster.reshape(-1, 1).take(place[soft], 0)
         return colour if alpha is None else np.concatenate([colour * alpha, alpha], axis=1)
 
 
 Texture = ImplicitTexture | PyramidTexture
+
+
+@lru_cache(maxsize=16)
+def _seen(view: PyramidTexture, moved: Moved) -> Samples:
+    """Computes `PyramidTexture.kept` of a view with cuts and a matte."""
+    assert view.cuts is not None, "other views are simpler"
+    return view.cuts.seen(moved) & ~(view.soft & view.cuts.loose(moved))
 
 
 def _samples(mask: NDArray[np.bool_], cell: int, part: Box) -> Samples:
@@ -355,13 +392,12 @@ def unpack(
             raise FormatError("the mask of the view is full or empty", where, rule="PYR-39")
         if cuts is not None:
             cuts = replace(cuts, within=_samples(mask, fields["cell"], part))
-    alpha, behind, behind_alpha = (
-        planes[fields[key] - 1] if fields[key] else None
-        for key in ("alpha", "behind", "behind_alpha")
+    alpha, behind, behind_alpha, matte = (
+        planes[fields[key] - 1] if fields[key] else None for key in texr.PLANES
     )
     texture = PyramidTexture(
         planes[fields["planes"]], alpha, (x, y, width, height), fields["cell"], mask, cuts,
-        behind, behind_alpha, unpacked_copies(fields, where),
+        behind, behind_alpha, unpacked_copies(fields, where), matte,
     )  # fmt: skip
     texture.__dict__["coded_mask"] = fields["mask"]
     return texture

@@ -71,7 +71,9 @@ def finer(
     """
     weights = model.synthesis[min(level, len(model.synthesis)) - 1]
     t = np.float32((step - STEP_ORIGIN) / 128)
-    gain = np.exp(weights.gain.floats + weights.gain_by_step.floats * t)
+    # In double precision, so that all machines round it to the same numbers.
+    gain = np.exp(weights.gain.floats + weights.gain_by_step.floats * t, dtype=np.float64)
+    gain = gain.astype(np.float32)
     bias = weights.first_bias.floats + weights.first_by_step.floats * t
     linear = _linear(model, level).astype(np.float32)
     if kernel.available():
@@ -102,6 +104,8 @@ def colours(model: Model, planes: Floats, step: int, level: int = 0) -> Floats:
     for left_out in range(1, level + 1):
         matrix = (matrix @ _evenly(model, left_out)).astype(np.float32)
     matrix = matrix * np.float32(2 ** (step / 64))
+    if kernel.available():
+        return kernel.coloured(np.ascontiguousarray(planes), matrix)
     out = np.empty_like(planes)
     for top, bottom in strips(*planes.shape[:2]):
         out[top:bottom] = planes[top:bottom] @ matrix.T + 128

@@ -232,10 +232,11 @@ def test_soft_masks_are_cut_and_it_is_said(tool, photo_png, tmp_path):
     (tmp_path / "masks").mkdir()
     write(tmp_path / "masks" / "veil.png", np.repeat(soft[..., None], 3, 2))
     words = "encode", photo_png, tmp_path / "a.pxi", "-f", *TINY, "--masks", tmp_path / "masks"
+    words = *words, "--matte", "hard"
     lines = tool(*words).err.splitlines()
     assert len(lines) == 2
     assert lines[0].startswith("pxi-encode: warning: soft masks are cut at one half")
-    assert "veil.png" in lines[0]
+    assert lines[0].endswith("veil")
     assert tool(*words, "--quiet").err == ""
     assert not painted(pxi.open(tmp_path / "a.pxi"), "veil")[:, :20].any()
 

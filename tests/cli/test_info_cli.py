@@ -187,3 +187,11 @@ def test_what_lies_behind(tool):
     assert back["texture_bytes"] > 0
     out = tool("info", file).out.decode()
     assert ", planes 2 behind with alpha of planes 3, 5 offsets for cells of 2 samples" in out
+
+
+def test_what_is_soft(tool):
+    file = ROOT / "conformance/cases/mattes/matte/input.pxi"
+    facts = json.loads(tool("info", file, "--json").out)
+    assert [v["matte"] for v in facts["layers"]] == [None, 2, None]
+    assert not facts["alpha"]
+    assert ", planes 1 behind, soft by planes 2" in tool("info", file).out.decode()

@@ -361,9 +361,10 @@ def test_several_pictures_into_a_folder(tool, here):
 def test_several_files_are_drawn_into_a_folder(tool, picture):
     picture("a.pxi"), picture("b.v2")
     os.mkdir("out")
-    err = tool("decode", "a.pxi", "b.v2", "-o", "out", "--width", "31").err
-    assert [line.split(":")[0] for line in err.splitlines()] == ["out/a.png", "out/b.v2.png"]
-    assert {read(f"out/{name}").pixels.shape[1] for name in os.listdir("out")} == {31}
+    err = tool("decode", "a.pxi", "b.v2", "-o", "out", "--width", "31", "-j", "1").err
+    names = [line.split(":")[0] for line in err.splitlines()]
+    assert names == ["out/a.png", "out/b.v2.png", "out"]
+    assert {read(f"out/{name}").pixels.shape[1] for name in ("a.png", "b.v2.png")} == {31}
 
 
 @encoder
@@ -380,7 +381,7 @@ def test_one_failure_does_not_stop_the_others_and_tells(tool, here):
     for line, said in zip(ran.err.splitlines(), ("b.png", "missing.png", "out/c.pxi"), strict=True):
         assert line.startswith("pxi-encode: ")
         assert said in line
-    assert sorted(os.listdir("out")) == ["a.pxi", "c.pxi", "d.pxi"]
+    assert sorted(os.listdir("out")) == [".pxi-batch", "a.pxi", "c.pxi", "d.pxi"]
     assert content("out/c.pxi") == b"old"
 
 
@@ -390,14 +391,14 @@ def test_the_first_failure_decides(tool, picture):
     with open("b.pxi", "wb") as file:
         file.write(data[:-40])
     words = "decode", "a.pxi", "b.pxi", "c.pxi", "none.pxi", "-o", "out/", "--quiet"
-    tool(*words, code=4, lines=2)
-    assert sorted(os.listdir("out")) == ["a.png", "c.png"]
+    tool(*words, "-j", "1", code=4, lines=2)
+    assert sorted(os.listdir("out")) == [".pxi-batch", "a.png", "c.png"]
 
 
 @encoder
 def test_an_error_that_names_no_file_gets_its_name(tool, here):
     png("a.png"), png("b.png")
-    flags = ("--target-psnr", "99", "-e", "1", "--layers", "1")
+    flags = ("--target-psnr", "99", "-e", "1", "--layers", "1", "-j", "1", "--quiet")
     ran = tool("encode", "a.png", "b.png", "-o", "out/", *flags, code=2, lines=2)
     assert [line.split(": ")[1] for line in ran.err.splitlines()] == ["a.png", "b.png"]
 
@@ -412,7 +413,6 @@ def test_an_error_that_names_no_file_gets_its_name(tool, here):
         (("a.png", "b.png", "c.pxi"), "-o FOLDER/"),
         (("a.png", "b.png", "c.png"), "-o FOLDER/"),
         (("-", "b.png", "-o", "out/"), "standard input"),
-        (("/", "b.png", "-o", "out/"), "'/'"),
         (("a.png", "b.png", "-o", "out/", "--masks", "m"), "--masks"),
         (("a.png", ""), "empty"),
         (("", "c.pxi"), "empty"),
@@ -432,8 +432,7 @@ def test_refused_before_anything_is_written(tool, here, words, said):
     png("a.png"), png("b.png"), png("c.png")
     shutil.copy("a.png", "a.jpg")
     before = sorted(os.listdir())
-    code = 3 if "/" in words else 2
-    assert said in tool("encode", "-f", "-e", "1", *words, code=code).err
+    assert said in tool("encode", "-f", "-e", "1", *words, code=2).err
     assert sorted(os.listdir()) == before
 
 
@@ -441,7 +440,9 @@ def test_outputs_in_the_folder_of_the_inputs_replace_none_of_them(tool, picture)
     for name in ("a.pxi", "b.png", "c.pxi"):
         picture(name)
     before = content("b.png")
-    err = tool("decode", "c.pxi", "b.png", "a.pxi", "-o", ".", "-f", "--quiet", code=2).err
+    err = tool(
+        "decode", "c.pxi", "b.png", "a.pxi", "-o", ".", "-f", "--quiet", "-j", "1", code=2
+    ).err
     assert "b.png: input and output are the same file" in err
     assert content("b.png") == before
     assert {"a.png", "c.png"} < set(os.listdir())

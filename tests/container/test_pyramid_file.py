@@ -97,7 +97,7 @@ VIEWS = [
     (2, {"alpha": 2}, "TEXR: planes 1 do not exist"),
     (1, {"cell": 1}, "TEXR: cells without a mask"),
     (0, {"alpha": 1}, "TEXR: planes of alpha are not grey"),
-    (2, {"coder": 1}, "TEXR.*13 values instead of 7: coder, network"),
+    (2, {"coder": 1}, "TEXR.*14 values instead of 7: coder, network"),
     (2, {"coder": 0}, "TEXR.*payload is not valid msgpack"),
     (1, {"behind": 2}, "TEXR: planes 1 do not exist"),
     (0, {"behind_alpha": 1}, "TEXR: behind_alpha without behind, or without alpha"),

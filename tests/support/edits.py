@@ -77,6 +77,7 @@ BAD = [
     ({"op": "cut", "layer": "disc"}, "either a mask"),
     ({"op": "cut", "layer": "disc", "points": []}, "points"),
     ({"op": "cut", "layer": "disc", "mask": "m.png", "outside": [[1, 2]]}, "either a mask"),
+    ({"op": "complete", "layer": "back"}, "implicit texture"),
     ({"op": "merge", "layer": "disc", "other": "disc"}, "twice"),
     ({"op": "merge", "layer": "disc", "other": "bar"}, "textures of their own"),
     ({"op": "insert", "source": "nothing.png"}, "no file"),

@@ -3,6 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from proxyimg_codec.native import kernel
 from proxyimg_codec.texture import diffusion
 from proxyimg_codec.texture.diffusion import FRACTION_BITS, diffused, fill
 
@@ -85,6 +86,25 @@ def test_tiles_do_not_show(tile, monkeypatch):
     known = np.ones((45, 150), bool)
     known[5:40, 11:60], known[3, 149] = False, False
     known[20:, 128:] = rng.random((25, 22)) < 0.2
-    out = diffused(value, known)
-    for channel, got in zip(value, out, strict=True):
-        np.testing.assert_array_equal(got, plainly(channel.astype(np.int64), known))
+    for engine in ("numpy", "auto"):
+        with kernel.for_engine(engine):
+            out = diffused(value, known)
+        for channel, got in zip(value, out, strict=True):
+            np.testing.assert_array_equal(got, plainly(channel.astype(np.int64), known))
+
+
+@pytest.mark.skipif(not kernel.available(), reason="the kernel was not compiled")
+@pytest.mark.parametrize("share", [0.001, 0.3, 0.999])
+@pytest.mark.parametrize("shape", [(1, 1, 1), (3, 1, 300), (2, 257, 129), (4, 131, 401)])
+def test_the_kernel_fills_as_numpy_does(shape, share):
+    rng = np.random.default_rng(shape[2])
+    value = rng.integers(-(1 << 24), 1 << 24, shape).astype(np.int32)
+    known = rng.random(shape[1:]) < share
+    known[-1, -1] = True
+    wanted = np.zeros(known.shape, bool)
+    wanted[: shape[1] // 3 + 1, : shape[2] // 3 + 1] = True
+    found = [diffused(value, known), diffused(value, known, wanted)]
+    with kernel.for_engine("numpy"):
+        expected = diffused(value, known)
+    np.testing.assert_array_equal(found[0], expected)
+    np.testing.assert_array_equal(found[1][:, wanted], expected[:, wanted])

@@ -266,3 +266,24 @@ def test_numbers():
     assert (front.own, front.fronts) == (None, (b,))
     assert front.numbers(0, [None, b, b]) == [1]
     assert Occlusion.of([], 0, [None], PART) is None
+
+
+def test_samples_near_what_changed_behind_are_loose():
+    box, own = (0, 0, 30, 20), rectangle(0, 0, 480, 320)
+    cuts = Occlusion(own, (), box)
+    assert not cuts.loose(ALL_IN_PLACE).any()
+    assert cuts.loose(Moved(behind=ALL_REMOVED)).all()
+    assert cuts.loose(Moved(apart=True)).all()
+    assert Occlusion(None, (own,), box).loose(ALL_IN_PLACE).all()
+    spot = rectangle(16 * 8, 16 * 7, 16 * 10, 16 * 9)
+    found = cuts.loose(Moved(behind=((spot, False), (None, True))))
+    expected = np.zeros((20, 30), bool)
+    expected[5:11, 6:12] = True
+    np.testing.assert_array_equal(found, expected)
+
+
+def test_soft_layers_hide_nothing():
+    low, high, own = rectangle(0, 0, 99, 99), rectangle(0, 0, 320, 320), rectangle(0, 0, 200, 200)
+    cuts, stack, still = Occlusion(own, (), (0, 0, 20, 20)), [low, high, own], [False, True, True]
+    assert cuts.moved(2, stack, still).behind == ((high, True), (low, False))
+    assert cuts.moved(2, stack, still, frozenset([1])).behind == ((low, False),)

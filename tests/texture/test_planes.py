@@ -305,6 +305,20 @@ def test_engines_synthesize_alike(case):
     np.testing.assert_allclose(found["kernel"], found["numpy"], atol=1e-5 * scale)
 
 
+@needs_kernel
+@pytest.mark.parametrize("rows", [1, 2, 3, 14, 21])
+@pytest.mark.parametrize("columns", [1, 2, 9, 64])
+def test_engines_make_the_same_plain_planes(rows, columns):
+    rng = np.random.default_rng(rows)
+    shape = -(-rows // 2), -(-columns // 2)
+    most = context.LIMIT << 4
+    low = rng.integers(-most, most + 1, (3, *shape)).astype(np.int32)
+    high = rng.integers(1 - context.LIMIT, context.LIMIT, (9, *shape)).astype(np.int32)
+    found = context.next_plain(low, high, (rows, columns))
+    with engine("numpy"):
+        np.testing.assert_array_equal(found, context.next_plain(low, high, (rows, columns)))
+
+
 @pytest.mark.parametrize("size", [1, 2, 3, 4, 5, 8, 9, 30, 31])
 def test_bands_are_mirrored_as_the_line_is(size):
     """The halves of a line that is mirrored about its first and last value are what indices say."""

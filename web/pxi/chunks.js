@@ -67,14 +67,17 @@ const TEXTURES = [
     coder: int(0, 255), planes: int(0, 2 ** 16), alpha: int(0, 2 ** 16),
     part: ints(0, 2 ** 24, 4), cell: int(0, 6), mask: bytes, cuts: ints(0, 2 ** 16),
     behind: int(0, 2 ** 16), behind_alpha: int(0, 2 ** 16), grain: int(0, 6),
-    offsets: ints(-(2 ** 24), 2 ** 24), sources: bytes, unmix: int(0, 1),
+    offsets: ints(-(2 ** 24), 2 ** 24), sources: bytes, unmix: int(0, 1), matte: int(0, 2 ** 16),
   },
 ];
 
-/** What a pyramid texture has in files of versions before 0.11 (CON-19). */
-const ABSENT = {
-  behind: 0, behind_alpha: 0, grain: 0, offsets: [], sources: new Uint8Array(), unmix: 0,
-};
+/** What pyramid textures have in files of versions before these minor ones (CON-19). */
+const ADDED = [
+  [11, {
+    behind: 0, behind_alpha: 0, grain: 0, offsets: [], sources: new Uint8Array(), unmix: 0,
+  }],
+  [12, { matte: 0 }],
+];
 
 /** A layer without POSE has this one (chapter 3). */
 export const REST = Object.freeze({
@@ -96,8 +99,9 @@ function unpack({ kind, payload, minor }) {
   const values = new Values(payload);
   const { map, count } = values.header();
   need(!map || minor <= 3, `${kind} is a map`);
-  let absent = table === TEXTURES[2] && minor < 11 ? ABSENT : {};
-  if (kind === "PLAN" && minor < 12) absent = { tile: 0, details: [] };
+  const newer = table === TEXTURES[2] ? ADDED.filter(([since]) => minor < since) : [];
+  const absent = Object.assign({}, ...newer.map(([, fields]) => fields));
+  if (kind === "PLAN" && minor < 12) Object.assign(absent, { tile: 0, details: [] });
   const keys = Object.keys(table).filter((key) => !(key in absent));
   need(count === keys.length, `${kind} has ${count} values instead of ${keys.length}`);
   const content = { ...absent };
@@ -198,9 +202,10 @@ function checkPlans({ plans, textures }, limits) {
     need([0, plan.levels].includes(plan.details.length), "the number of details is wrong");
   }
   const met = new Set();
-  for (const { coder, planes, alpha, behind, behind_alpha: soft } of textures) {
+  for (const { coder, planes, alpha, behind, behind_alpha: soft, matte } of textures) {
     if (coder !== 2) continue;
-    for (const number of [planes + 1, alpha, behind, soft].filter((n) => n)) met.add(number - 1);
+    const named = [planes + 1, alpha, behind, soft, matte];
+    for (const number of named.filter((n) => n)) met.add(number - 1);
   }
   need([...met].every((number) => number < plans.length), "planes that do not exist");
   need(met.size === plans.length, "planes that no texture uses");
@@ -224,9 +229,9 @@ function checkTexture({ head, layers, networks, plans, textures }, texr, k) {
   }
 }
 
-/** PYR-38 to PYR-40. */
+/** PYR-38 to PYR-40, and PYR-53. */
 function checkView({ head, layers, plans }, texr, k) {
-  const { planes, alpha, part, cell, mask, cuts } = texr;
+  const { planes, alpha, part, cell, mask, cuts, matte } = texr;
   const [x, y, w, h] = part;
   const { size } = plans[planes];
   need(w >= 1 && h >= 1 && x + w <= size[0] && y + h <= size[1], "a part is not in its raster");
@@ -234,6 +239,12 @@ function checkView({ head, layers, plans }, texr, k) {
     const other = plans[alpha - 1];
     need(other.components === 1 && head.channels === 4, "alpha from planes of colour");
     need(other.size.every((n, i) => n === size[i]), "planes of alpha have another size");
+  }
+  if (matte) {
+    const own = plans[matte - 1];
+    need(own.components === 1 && head.channels === 4, "a matte from planes of colour");
+    need(own.size[0] === w && own.size[1] === h, "a matte has another size than the part");
+    need(texr.behind && !texr.unmix, "a matte without planes behind, or with unmix");
   }
   need(mask.length || !cell, "a cell without a mask");
   checkHidden(plans, texr);
@@ -267,7 +278,8 @@ function checkOpaque({ head, layers, poses, networks, textures }) {
   if (!head.opaque) return;
   const [texr] = textures;
   need(!layers[0].segments.length, "the back layer of an opaque file has a boundary");
-  const clear = texr.coder === 1 ? networks[texr.network].channels === 4 : texr.alpha !== 0;
+  const clear = texr.coder === 1 ? networks[texr.network].channels === 4 :
+    texr.alpha !== 0 || texr.matte !== 0;
   need(!clear, "the back layer of an opaque file has alpha");
   const pose = poses.get(0) ?? REST;
   const still = identity(pose) && pose.opacity === 65535 && !pose.hidden;
@@ -320,7 +332,7 @@ function checkLimits({ layers, meshes, networks, textures, motion }, limits) {
         add("codes", channels * columns * rows);
       }
       const fills = texr.sources.length ? 2 : 1;
-      if (texr.mask.length || texr.cuts.length) add("filled", fills * w * h);
+      if (texr.mask.length || texr.cuts.length || texr.matte) add("filled", fills * w * h);
       add("covered", w * h * (texr.cuts.length + (texr.cuts.includes(k) ? k : 0)));
     }
   });

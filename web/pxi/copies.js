@@ -57,8 +57,7 @@ function liftsOf(texr, sources, values, known) {
   const side = 2 ** texr.grain;
   const [rows, columns] = [h, w].map((n) => Math.ceil(n / side));
   const half = Math.floor(side / 2);
-  const mean = (sum, n) => (n ? clamp(quotient(sum, n), -LIFT, LIFT) : 0);
-  /** Sums of the differences of two values at the samples of a square, and their number. */
+  /** Means of the differences of two values at the samples of a square, and their number. */
   const compare = (top, left, size, pair) => {
     const sums = values.map(() => 0);
     let count = 0;
@@ -70,7 +69,8 @@ function liftsOf(texr, sources, values, known) {
         values.forEach((value, c) => (sums[c] += value[one] - value[other]));
       }
     }
-    return [sums.map((sum) => mean(sum, count)), count];
+    const means = sums.map((sum) => (count ? quotient(sum, count) : 0));
+    return means.some((mean) => Math.abs(mean) > LIFT) ? [means, 0] : [means, count];
   };
   const cells = [...sources.keys()].filter((k) => sources[k]);
   const links = new Map(cells.map((k) => [k, []]));

@@ -50,6 +50,36 @@ function far(spoilt, w, h, reach = 2) {
  * drawn; `k` is the number of the TEXR.
  */
 function masksOf(scene, n, k) {
+  const found = hardMasksOf(scene, n, k);
+  const soft = softOf(scene, k);
+  if (!soft) return { ...found, soft };
+  const { part } = scene.textures[k];
+  const [, , w, h] = part;
+  const all = new Uint8Array(w * h).fill(1);
+  const apart = scene.drawn.some((b) => b < n && !rest(scene, n, k, b));
+  const still = found.lost && !apart ? far(found.lost, w, h) : new Uint8Array(w * h);
+  const shown = (found.shown ?? all).map((v, i) => v & (!soft[i] || still[i]));
+  const trusted = (found.trusted ?? all).map((v, i) => v & !soft[i]);
+  return { ...found, shown, trusted, soft };
+}
+
+/** Which samples of a part are soft (PYR-53); null without a matte. */
+function softOf({ textures, plans }, k) {
+  const { matte, part: [, , w, h] } = textures[k];
+  return matte ? storedOf(plans[matte - 1], w, h) : null;
+}
+
+/** Which samples of a raster lie in cells that are stored (PYR-5). */
+function storedOf({ cell, support }, w, h) {
+  const stored = new Uint8Array(w * h).fill(1);
+  if (!support.length) return stored;
+  const wide = Math.ceil(w / 2 ** cell);
+  const bits = decodeMask(support, Math.ceil(h / 2 ** cell), wide);
+  return stored.map((v, i) => bits[(Math.floor(i / w) >> cell) * wide + ((i % w) >> cell)]);
+}
+
+/** The same without what a matte does; `lost` are the samples that are bare to the layer itself. */
+function hardMasksOf(scene, n, k) {
   const { layers, textures, limits } = scene;
   const { part, mask, cell, cuts, unmix: unmixed } = textures[k];
   const [, , w, h] = part;
@@ -95,16 +125,16 @@ function masksOf(scene, n, k) {
   if (own && !unmixed) {
     const clear = far(own.map((v, i) => v < FULL && lost[i]), w, h);
     const left = open.map((v, i) => v & (own[i] > 0) & clear[i]);
-    return { shown: left.includes(1) ? left : shown, trusted, edge: null };
+    return { shown: left.includes(1) ? left : shown, trusted, edge: null, lost };
   }
   const edge = own && edgeOf(own, open, lost, w, h);
   const left = open.map((v, i) => v & (!own || (own[i] > 0 && !edge.outer[i])));
-  if (!left.includes(1)) return { shown, trusted, edge: null };
+  if (!left.includes(1)) return { shown, trusted, edge: null, lost };
   if (edge) {
     const beyond = far(own, w, h, 1);
     edge.free = masked.map((v, i) => v & beyond[i] & !fronts[i]);
   }
-  return { shown: left, trusted, edge };
+  return { shown: left, trusted, edge, lost };
 }
 
 /** The samples at the boundary of the layer, which has the coverage `own` (PYR-52). */
@@ -162,6 +192,7 @@ function bareBehind(scene, n, k, covered, size) {
   for (let b = k - 1; b >= 0; b--) {
     const rests = rest(scene, n, k, b);
     const cover = covered(b);
+    if (rests && matteOf(scene, b)) continue;
     for (let i = 0; i < size; i++) {
       const value = cover ? cover[i] : FULL;
       if (rests && value === FULL) hidden[i] = 1;
@@ -169,6 +200,12 @@ function bareBehind(scene, n, k, covered, size) {
     }
   }
   return found;
+}
+
+/** The matte of the texture that a layer shows, its own or shared; 0 if there is none. */
+function matteOf({ textures }, layer) {
+  const { coder, texture } = textures[layer];
+  return (coder === 0 ? textures[texture] : textures[layer]).matte;
 }
 
 /** Components [h, w] of a part of a raster. */
@@ -189,9 +226,9 @@ function componentsOf({ columns, planes }, [x0, y0, w, h]) {
  * `rasters(number)` gives the samples of a PLAN.
  */
 export function viewOf(scene, n, k, rasters) {
-  const { planes, alpha, behind, part } = scene.textures[k];
+  const { planes, alpha, behind, part, matte } = scene.textures[k];
   const [, , w, h] = part;
-  const { shown, trusted, edge } = masksOf(scene, n, k);
+  const { shown, trusted, edge, soft } = masksOf(scene, n, k);
   const sources = decodeSources(scene.textures[k]);
   let colours = componentsOf(rasters(planes), part);
   let share = alpha ? componentsOf(rasters(alpha - 1), part)[0] : null;
@@ -203,6 +240,13 @@ export function viewOf(scene, n, k, rasters) {
     share = share && merged.pop();
     if (edge) unmix(edge, own.slice(0, merged.length), merged, share, w, h);
     colours = merged;
+  }
+  if (soft) {
+    share = share ?? new Float32Array(w * h).fill(1);
+    if (soft.some((v, i) => v && !shown[i])) {
+      const [own] = componentsOf(rasters(matte - 1), [0, 0, w, h]);
+      share = share.map((v, i) => (soft[i] && !shown[i] ? v * own[i] : v));
+    }
   }
   const channels = share ? 4 : 3;
   const samples = new Float32Array(w * h * channels);
@@ -234,9 +278,7 @@ function hiddenOf({ textures, plans }, k, own, trusted, rasters, sources) {
   const known = trusted.slice();
   const values = own.map(whole);
   if (behind) {
-    const { cell, support } = plans[behind - 1];
-    const [wide, high] = [w, h].map((n) => Math.ceil(n / 2 ** cell));
-    const stored = support.length ? decodeMask(support, high, wide) : null;
+    const stored = storedOf(plans[behind - 1], w, h);
     const at = [0, 0, w, h];
     const count = values.length - (alpha ? 1 : 0);
     const others = evenly(componentsOf(rasters(behind - 1), at), count).map(whole);
@@ -244,13 +286,11 @@ function hiddenOf({ textures, plans }, k, own, trusted, rasters, sources) {
       const ones = () => new Int32Array(w * h).fill(FILL_ONE);
       others.push(soft ? whole(componentsOf(rasters(soft - 1), at)[0]) : ones());
     }
-    for (let y = 0, i = 0; y < h; y++) {
-      for (let x = 0; x < w; x++, i++) {
-        if (known[i] || (stored && !stored[(y >> cell) * wide + (x >> cell)])) continue;
-        known[i] = 1;
-        values.forEach((value, c) => (value[i] = others[c][i]));
-      }
-    }
+    stored.forEach((there, i) => {
+      if (known[i] || !there) return;
+      known[i] = 1;
+      values.forEach((value, c) => (value[i] = others[c][i]));
+    });
   }
   if (sources) copy(texr, sources, values, known);
   const diffusion = new Diffusion(known, h, w);

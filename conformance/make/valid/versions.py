@@ -52,11 +52,16 @@ def _version_0_9(n: Numbers) -> bytes:
        "pyramid: cuts")  # fmt: skip
 def _version_0_10(n: Numbers) -> bytes:
     """With what was possible in it alone."""
-    chunks = [
-        replace(c, payload=msgpack.packb(msgpack.unpackb(c.payload)[:7])) if c.type == "TEXR" else c
+    return write(_before_0_12(n, 7), (0, 10))
+
+
+def _before_0_12(n: Numbers, count: int) -> list[Chunk]:
+    """Chunks of a picture whose pyramid textures have the first `count` values."""
+    return [
+        replace(c, payload=msgpack.packb(msgpack.unpackb(c.payload)[:count]))
+        if c.type == "TEXR" else c
         for c in planes_first(to_bytes(pieces(n, {"disc": Pose(shift=(3 * 1024, -900))})))
-    ]
-    return write(chunks, (0, 10))
+    ]  # fmt: skip
 
 
 def planes_first(data: bytes) -> list[Chunk]:
@@ -78,8 +83,7 @@ def planes_first(data: bytes) -> list[Chunk]:
 @_case("A file of version 0.11, whose pyramid textures end with unmix", "file: version", "CON-19",
        "CON-20", "pyramid: cuts")  # fmt: skip
 def _version_0_11(n: Numbers) -> bytes:
-    moved = pieces(n, {"disc": Pose(shift=(3 * 1024, -900))})
-    return write(planes_first(to_bytes(moved)), (0, 11))
+    return write(_before_0_12(n, 13), (0, 11))
 
 
 @_case("A file of version 0.2 with arrays", "file: version", "fields: maps")

@@ -4,7 +4,8 @@ From coarse to fine, patches that touch the hole look for the most similar patch
 (PatchMatch: Barnes and others 2009), and each hidden pixel becomes a weighted mean of what the
 patches over it have found, several times (Wexler, Shechtman and Irani 2007, "Space-Time Completion
 of Video"). Besides colours, patches compare the mean size of gradients around each pixel (Newson
-and others 2014, "Video Inpainting of Complex Scenes"): without it, smooth places win.
+and others 2014, "Video Inpainting of Complex Scenes"): without it, smooth places win. Those of the
+hole are continued from its rim and not averaged, for averages of averages become smooth too.
 """
 
 from __future__ import annotations
@@ -22,8 +23,13 @@ from .membrane import continued_from
 REACH = 3
 """Patches are squares of 2 `REACH` + 1 pixels."""
 
-TEXTURE, AROUND = 4.0, 2.5
-"""Weight of the sizes of gradients beside colours, and standard deviation in pixels of the mean."""
+TEXTURE, AROUND, STEP = 2.8, 2.5, 2
+"""Weight of the sizes of gradients beside colours, standard deviation in pixels of the mean, and
+pixels from one end of a gradient to the other."""
+
+BUSIER = 1.3
+"""Factor by which gradients in the hole are larger than their continuation, for what is found to
+fit is smoother than what was looked for."""
 
 ROUNDS = (10, 6, 4, 3, 2)
 """Rounds of finding and averaging at each level, the coarsest first; the last for all others."""
@@ -33,6 +39,9 @@ LEAST = 4.0
 
 FEW = 300
 """Fewest whole patches to choose from at the coarsest level."""
+
+TRIALS = 4
+"""Times that the coarsest level begins at random; the best one goes on."""
 
 MOST = 12000
 """Most patches of a level; finer levels are left out."""
@@ -69,20 +78,25 @@ def guessed(features: Floats, known: Pixels, hole: Pixels, seed: int) -> Guess:
         seed: Seed of the random search.
     """
     rng = np.random.default_rng([seed, 17])
-    levels = _levels(features, known, hole)
-    found: _Level | None = None
-    scale = 1
-    for number, (features, seen, wanted) in enumerate(reversed(levels)):
-        level = _Level(features, seen, wanted)
-        if found is not None and len(level.rows) > MOST:
+    *finer, coarsest = _levels(features, known, hole)
+    tried = [_found(_Level(*coarsest), None, ROUNDS[0], rng) for _ in range(TRIALS)]
+    found, scale = min(tried, key=lambda level: float(level.apart.mean())), 2 ** len(finer)
+    for number, planes in enumerate(reversed(finer), 1):
+        level = _Level(*planes)
+        if len(level.rows) > MOST:
             break
-        level.begin(found, rng)
-        for k in range(ROUNDS[min(number, len(ROUNDS) - 1)]):
-            level.search(rng, 2 if k else 3)
-            level.vote()
-        found, scale = level, 2 ** (len(levels) - 1 - number)
-    assert found is not None
-    return _enlarged(found, scale, levels[0][0], hole)
+        found = _found(level, found, ROUNDS[min(number, len(ROUNDS) - 1)], rng)
+        scale //= 2
+    return _enlarged(found, scale, features, hole)
+
+
+def _found(level: _Level, coarse: _Level | None, rounds: int, rng: np.random.Generator) -> _Level:
+    """A level after all of its rounds, begun with what a coarser one has found, or at random."""
+    level.begin(coarse, rng)
+    for k in range(rounds):
+        level.search(rng, 2 if k else 3)
+        level.vote()
+    return level
 
 
 def features_of(colours: Floats, known: Pixels) -> Floats:
@@ -95,12 +109,16 @@ def features_of(colours: Floats, known: Pixels) -> Floats:
     Returns:
         float32 [H, W, 5].
     """
-    grey = colours.mean(2)
-    inside = cv2.erode(known.astype(np.uint8), np.ones((3, 3), np.uint8)).astype(np.float32)
+    seen = known.astype(np.float32)
+    soft = cv2.GaussianBlur(colours.mean(2) * seen, (0, 0), STEP / 2)
+    soft /= np.maximum(cv2.GaussianBlur(seen, (0, 0), STEP / 2), np.float32(1e-3))
+    square = np.ones((2 * STEP + 1,) * 2, np.uint8)
+    inside = cv2.erode(known.astype(np.uint8), square).astype(np.float32)
     share = np.maximum(cv2.GaussianBlur(inside, (0, 0), AROUND), np.float32(1e-3))
     planes: list[Any] = [colours]
     for axis in (1, 0):
-        size = np.abs(np.diff(grey, axis=axis, append=grey.take([-1], axis)))
+        ends = soft.take(np.minimum(np.arange(soft.shape[axis]) + STEP, soft.shape[axis] - 1), axis)
+        size = np.abs(ends - soft)
         planes.append(cv2.GaussianBlur(size * inside, (0, 0), AROUND) / share * TEXTURE)
     features = np.dstack(planes).astype(np.float32)
     return np.where(known[..., None], features, continued_from(features, known))
@@ -143,7 +161,7 @@ class _Level:
     """One level of the search.
 
     Attributes:
-        features: float32 [H, W, 5]; the hole is changed by `vote`.
+        features: float32 [H, W, 5]; colours of the hole are changed by `vote`.
         rows, columns: int64 [n] centres of the patches that touch the hole.
         targets: int64 [n, 2] row and column of the patch that each has found.
         apart: float32 [n] sums of squared differences of the two.
@@ -151,6 +169,7 @@ class _Level:
 
     def __init__(self, features: Floats, known: Pixels, hole: Pixels) -> None:
         self.features, self.hole = features.copy(), hole
+        self.features[hole, 3:] *= np.float32(BUSIER)
         self.source = whole(known)
         square = np.ones((2 * REACH + 1,) * 2, np.uint8)
         near = cv2.dilate(hole.astype(np.uint8), square) > 0
@@ -183,7 +202,7 @@ class _Level:
         self.targets[inside] = moved[inside]
         larger = cv2.resize(coarse.features, None, fx=2, fy=2, interpolation=cv2.INTER_LINEAR)
         high, wide = self.hole.shape
-        self.features[self.hole] = larger[:high, :wide][self.hole]
+        self.features[self.hole, :3] = larger[:high, :wide, :3][self.hole]
         self.vote()
 
     def search(self, rng: np.random.Generator, times: int) -> None:
@@ -224,7 +243,7 @@ class _Level:
         """Gives hidden pixels the weighted means of what the patches over them have found."""
         sigma = max(float(np.percentile(self.apart, 75)), 1.0)
         weight = self.weight * np.exp(-self.apart / (2 * sigma)) + np.float32(1e-8)
-        padded = self._padded()
+        padded = self._padded()[..., :3]
         total, share = np.zeros_like(padded), np.zeros(padded.shape[:2], np.float32)
         for j in range(2 * REACH + 1):
             for i in range(2 * REACH + 1):
@@ -233,7 +252,7 @@ class _Level:
                 share[self.rows + j, self.columns + i] += weight
         inner = slice(REACH, -REACH)
         mean = total[inner, inner] / np.maximum(share[inner, inner], np.float32(1e-8))[..., None]
-        self.features[self.hole] = mean[self.hole]
+        self.features[self.hole, :3] = mean[self.hole]
 
     def _padded(self) -> Floats:
         return np.pad(self.features, ((REACH, REACH), (REACH, REACH), (0, 0)), mode="edge")

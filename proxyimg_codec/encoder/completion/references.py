@@ -33,7 +33,7 @@ CHOICES = 15
 TRIED = 120
 """Most offsets of the guess that are looked at."""
 
-RIM, GUESS, SEAM = 1.0, 0.3, 0.5
+RIM, GUESS, SEAM = 2.0, 0.3, 0.5
 """Weights of squared differences from known pixels, from the guess, and between neighbours."""
 
 PRICE = 6000.0

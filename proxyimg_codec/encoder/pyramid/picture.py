@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,9 +26,11 @@ from ..settings import Settings
 from ..shapes.coverage import coverage_of
 from ..shapes.layers import Plan
 from .encode import CELL, EFFORTS, Effort, Raster, encode
+from .matte import Soft, soft_rasters
 
 Report = Callable[[str, int, int], None]
 Box = tuple[int, int, int, int]
+View = tuple[Box, Occlusion | None]
 
 TOLERANCE = 0.015
 """Deviation from a target that is good enough: of the logarithm of a size, or of PSNR / 5 dB."""
@@ -73,32 +76,40 @@ def encode_picture(
     """
     height, width = picture.shape[:2]
     boundaries = [v.boundary for v in plan.layers]
-    views = [
-        _view(boundaries, k, coverage_of(boundary, width, height).reshape(height, width))
-        for k, boundary in enumerate(boundaries)
-    ]
+    views, softs = list[View](), dict[int, Soft]()
+    for k, layer in enumerate(plan.layers):
+        covered = coverage_of(layer.boundary, width, height).reshape(height, width)
+        box, cuts = _view(boundaries, k, covered)
+        if layer.alpha is not None and cuts is not None:
+            found = soft_rasters(picture[..., :3], layer.alpha, covered, cuts)
+            softs |= {} if found is None else {k: found}
+        views.append((box, replace(cuts, unmix=False) if cuts and k in softs else cuts))
     rasters = [colour_of(picture)._replace(structural=settings.tune == "ms-ssim")]
     if plan.channels == 4:
         rasters.append(alpha_of(picture[..., 3]))
     shared = len(rasters)
     own = [] if behind is None else _behind(rasters, views[0][1], behind)
     rasters += own
+    numbers = [dict[str, int]() for _ in views]
+    numbers[0] = {name: shared + i for i, name in enumerate(("behind", "behind_alpha")[: len(own)])}
+    for k, each in softs.items():
+        numbers[k] = {"behind": len(rasters), "matte": len(rasters) + 1}
+        rasters += [each.behind, each.matte]
     copies = [
-        None if own and k == 0 else copies_of(picture, cuts, settings)
+        None if own and k == 0
+        else copies_of(picture, cuts, settings, softs[k].samples if k in softs else None)
         for k, (_, cuts) in enumerate(views)
-    ]
+    ]  # fmt: skip
 
     def picture_of(sources: Sequence[Planes]) -> Picture:
         alpha = sources[1] if shared > 1 else None
-        hidden, alpha_of_hidden = (*sources[shared:], None, None)[:2]
-        layers = [
-            Layer(v.name, box, v.boundary,
-                  PyramidTexture(sources[0], alpha, box, cuts=cuts, behind=None if k else hidden,
-                                 behind_alpha=None if k else alpha_of_hidden, copies=copies[k]),
-                  v.mesh, parent=v.parent)
-            for k, (v, (box, cuts)) in enumerate(zip(plan.layers, views, strict=True))
-        ]  # fmt: skip
-        return Picture(width, height, plan.channels, plan.opaque, 8, Layers(layers), (),
+        layers = []
+        for v, (box, cuts), copied, named in zip(plan.layers, views, copies, numbers, strict=True):
+            planes: dict[str, Any] = {name: sources[number] for name, number in named.items()}
+            shown = PyramidTexture(sources[0], alpha, box, cuts=cuts, copies=copied, **planes)
+            layers.append(Layer(v.name, box, v.boundary, shown, v.mesh, parent=v.parent))
+        channels = 4 if softs else plan.channels
+        return Picture(width, height, channels, plan.opaque, 8, Layers(layers), (),
                        groups=plan.groups)  # fmt: skip
 
     return encode_rasters(rasters, picture_of, picture, settings, report)
@@ -202,9 +213,7 @@ def _aimed(
     return image
 
 
-def _view(
-    boundaries: Sequence[Boundary | None], number: int, covered: Floats
-) -> tuple[Box, Occlusion | None]:
+def _view(boundaries: Sequence[Boundary | None], number: int, covered: Floats) -> View:
     """Box and cuts of a layer.
 
     Args:

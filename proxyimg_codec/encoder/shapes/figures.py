@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from .amodal import extended_beneath
 from .hierarchy import Hierarchy, merged
 from .maps import Maps, find_maps
 from .masks import Region, description, unique_names
@@ -54,9 +55,10 @@ def segment(
         support: bool [H, W], True for the pixels to segment; None for all of an opaque picture.
 
     Returns:
-        Disjoint regions back to front, whose union is the picture or the support. The rearmost of
-        an opaque picture is named `back`, the others by colour and place. It is the only one if
-        nothing stands out. The list is empty only if the support is.
+        Regions back to front, whose union is the picture or the support. Those of an opaque picture
+        may go on beneath others (`amodal`); the rearmost one is named `back`, the others by colour
+        and place. It is the only one if nothing stands out. The list is empty only if the support
+        is.
     """
     whole = np.ones(rgb.shape[:2], np.bool_) if support is None else support
     if not whole.any():
@@ -194,4 +196,5 @@ def layers(
     names = [description(rgb, mask) for mask in stack]
     if support is None:
         names[0] = "back"
+        stack = extended_beneath(stack, [float(maps.figure[mask].mean()) for mask in stack])
     return [Region(n, m) for n, m in zip(unique_names(names), stack, strict=True)]

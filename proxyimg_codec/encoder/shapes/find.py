@@ -57,7 +57,7 @@ def find_layers(
         jobs: Threads to use.
 
     Returns:
-        Regions back to front, disjoint, for `encode`; what nobody named is the first, ``back``.
+        Regions back to front, for `encode`; what nobody named is the first, ``back``.
 
     Raises:
         InputError: The array cannot be a picture, or prompts or masks do not fit it or each other.

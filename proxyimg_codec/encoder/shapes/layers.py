@@ -19,6 +19,8 @@ from .coverage import coverage_of
 from .external_models.depth import ordered_by_depth
 from .external_models.segmenters import find_depth, find_segmenter
 from .masks import NAME_MAX, Region, check_count, groups_of, resolve
+from .soft import SOFT_PIXELS, matted
+from .soft import dilated as _dilate
 
 UNIT = 2
 """Unit of boundaries: control points are multiples of 2**-UNIT pixel."""
@@ -29,10 +31,6 @@ OVERLAP = 3
 CORNER = 24
 """Most pixels of a continuation that is only the corner where two outlines cross; an edge of 8
 pixels has as many."""
-
-SOFT_PIXELS = 16
-"""Least size, in pixels, of a connected translucent part away from outlines, from which on textures
-have alpha."""
 
 FINE_PIXELS = 1 << 20
 """Most pixels of a transparent picture whose outlines are traced on a finer grid."""
@@ -63,12 +61,15 @@ class LayerPlan:
         boundary: Boundary at rest; None for the whole canvas.
         mesh: Mesh of the layer, or None.
         parent: Name of the layer or group that the layer follows, or None.
+        alpha: float32 [H, W] in 0..1, that of a soft layer, which is clear along its boundary; None
+            for others.
     """
 
     name: str
     boundary: Boundary | None
     mesh: Mesh | None = None
     parent: str | None = None
+    alpha: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +102,7 @@ def plan_layers(picture: Floats, settings: Settings, masks: Sequence[Region] | N
 
     Raises:
         InputError: A mask is invalid or does not fit the picture, or there are too many.
-        UsageError: There is no such segmenter or model of depth.
+        UsageError: There is no such segmenter or model of depth, or `matte` does not suit.
     """
     height, width = picture.shape[:2]
     alpha = picture[..., 3]
@@ -118,9 +119,9 @@ def plan_layers(picture: Floats, settings: Settings, masks: Sequence[Region] | N
         return Plan((LayerPlan("empty", None),), 4, False)
     if masks is not None:
         _check_masks(masks)
-        regions = resolve(masks, height, width, support)
+        regions = resolve(matted(masks, picture, settings, opaque), height, width, support)
     else:
-        regions = _found(picture, settings, support)
+        regions = matted(_found(picture, settings, support), picture, settings, opaque)
     outline = alpha if not opaque and not soft and height * width <= FINE_PIXELS else None
     check_count(len(regions), "layers, with what no mask covers,")
     # The planes hold one alpha per sample, which overlapping layers would apply twice.
@@ -133,7 +134,7 @@ def plan_layers(picture: Floats, settings: Settings, masks: Sequence[Region] | N
         if not opaque or k > 0:
             mask = _continued(region.mask, front, overlap, solid)
             boundary = _boundary(mask, outline, settings)
-        layers.insert(0, LayerPlan(region.name, boundary, parent=region.parent))
+        layers.insert(0, LayerPlan(region.name, boundary, parent=region.parent, alpha=region.alpha))
         front |= region.mask
     return Plan(tuple(layers), 4 if soft else 3, opaque, groups_of(regions))
 
@@ -175,7 +176,7 @@ def regions_of_picture(picture: Floats, settings: Settings) -> list[Region]:
         settings: Settings of the encoder.
 
     Returns:
-        Disjoint regions back to front; none if the picture is clear everywhere.
+        Regions back to front; none if the picture is clear everywhere.
 
     Raises:
         UsageError: There is no such segmenter.
@@ -251,11 +252,6 @@ def with_room(plan: Plan, alpha: Floats, settings: Settings) -> Plan:
         return plan
     around = _boundary(_dilate(alpha > 0.02, AROUND), None, settings)
     return replace(plan, layers=(replace(plan.layers[0], boundary=around),), channels=4)
-
-
-def _dilate(mask: NDArray[np.bool_], radius: int) -> NDArray[np.bool_]:
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1))
-    return cv2.dilate(mask.astype(np.uint8), kernel) > 0
 
 
 def _eroded(mask: NDArray[np.bool_], radius: int) -> NDArray[np.bool_]:

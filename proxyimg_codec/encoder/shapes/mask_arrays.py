@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from .labels import label_regions
 from .masks import Region, check_size
+from .soft import is_soft
 
 Masks = Region | NDArray[Any] | Mapping[str, NDArray[Any]] | Iterable[Region | NDArray[Any]]
 """What a program may pass as masks."""
@@ -47,17 +48,15 @@ def regions_of(masks: Masks, height: int, width: int) -> list[Region]:
     if isinstance(masks, np.ndarray) and masks.ndim == 2:
         masks = masks[None]
     named = _named(masks, height, width)
-    soft, regions = list[str](), list[Region]()
+    regions = list[Region]()
     for name, values in named:
         mask = _array(values, name, height, width)
-        cut, several = inside(mask, f"mask {name!r}")
-        regions.append(Region(name, cut))
-        soft += [repr(name)] * several
-    warn_of_soft(soft)
+        regions.append(Region(name, *inside(mask, f"mask {name!r}")))
+    warn_of_cut({repr(r.name): r.alpha for r in regions})
     return regions
 
 
-def inside(values: NDArray[Any], what: str) -> tuple[NDArray[np.bool_], bool]:
+def inside(values: NDArray[Any], what: str) -> tuple[NDArray[np.bool_], NDArray[np.float32] | None]:
     """Decides what is inside a mask [H, W].
 
     That is: True; everything but 0 in an array that has 0 and one other value; otherwise at least
@@ -68,18 +67,19 @@ def inside(values: NDArray[Any], what: str) -> tuple[NDArray[np.bool_], bool]:
         what: What is read, for error messages.
 
     Returns:
-        bool [H, W], and whether the mask is soft: it has more than two values.
+        bool [H, W]; and if the mask has more than two values, these as float32 [H, W] in 0..1,
+        otherwise None.
 
     Raises:
         InputError: The values are something else, or none of more than two reaches one half.
     """
     if values.dtype.kind == "b":
-        return np.asarray(values, np.bool_), False
+        return np.asarray(values, np.bool_), None
     if values.dtype.kind not in "iuf" or not np.isfinite(values).all():
         raise InputError(f"{what}: {values.dtype} with these values is no mask; pass bool, or 0..1")
     found = np.unique(values)
     if (found[0] == 0 and len(found) <= 2) or (found == 1).all():
-        return np.asarray(values != 0), False
+        return np.asarray(values != 0), None
     top = {"uint8": 255, "uint16": 65535}.get(str(values.dtype), 1)
     if found[0] < 0 or found[-1] > top or (top == 1 and values.dtype.kind != "f"):
         raise InputError(
@@ -92,11 +92,13 @@ def inside(values: NDArray[Any], what: str) -> tuple[NDArray[np.bool_], bool]:
             f"{what}: has {len(found)} values up to {found[-1]}, none of which is half of {top}; a "
             "mask has two values, or is brighter; labels are given alone, as whole numbers"
         )
-    return np.asarray(values >= half), len(found) > 2
+    alpha = np.asarray(values, np.float32) / np.float32(top) if len(found) > 2 else None
+    return np.asarray(values >= half), alpha
 
 
-def warn_of_soft(names: Sequence[str]) -> None:
-    """Says which masks were cut at one half."""
+def warn_of_cut(alphas: Mapping[str, NDArray[np.float32] | None]) -> None:
+    """Says which masks are cut at one half: by name, those with alpha that are not soft."""
+    names = [name for name, alpha in alphas.items() if alpha is not None and not is_soft(alpha)]
     if names:
         logging.getLogger(__name__).warning("soft masks are cut at one half: %s", ", ".join(names))
 
@@ -108,15 +110,19 @@ def _named(masks: Any, height: int, width: int) -> list[tuple[str, Any]]:
         for name in masks:
             if not isinstance(name, str):
                 raise InputError(f"masks: the name {name!r} is no text; {expected}")
-        return [(name, v.mask if isinstance(v, Region) else v) for name, v in masks.items()]
+        return [(name, _values(v) if isinstance(v, Region) else v) for name, v in masks.items()]
     if isinstance(masks, np.ndarray) and (masks.ndim != 3 or masks.shape[1:] != (height, width)):
         raise InputError(f"masks: an array of shape {masks.shape} is no masks; {expected}")
     if isinstance(masks, (str, bytes)) or not isinstance(masks, Iterable):
         raise InputError(f"masks: {type(masks).__name__} is not what masks can be; {expected}")
     return [
-        (v.name, v.mask) if isinstance(v, Region) else (f"object {k}", v)
+        (v.name, _values(v)) if isinstance(v, Region) else (f"object {k}", v)
         for k, v in enumerate(masks, 1)
     ]
+
+
+def _values(region: Region) -> NDArray[Any]:
+    return region.mask if region.alpha is None else region.alpha
 
 
 def _array(values: Any, name: str, height: int, width: int) -> NDArray[Any]:

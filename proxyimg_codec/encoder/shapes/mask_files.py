@@ -15,7 +15,7 @@ from PIL import Image, ImageOps, UnidentifiedImageError
 from ...errors import InputError
 from ...io.names import is_picture
 from .labels import label_regions
-from .mask_arrays import inside, warn_of_soft
+from .mask_arrays import inside, warn_of_cut
 from .masks import BACK_NAMES, NAME_MAX, Region, check_count, check_size
 
 TYPES = (
@@ -58,7 +58,7 @@ def load_masks(path: str | Path, width: int, height: int) -> list[Region]:
     folders are not followed. Inside is where alpha is at least one half if the file has
     transparency; otherwise what is not index 0 of a palette with colours; otherwise what is at
     least half as light as white, or not 0 in files with only 0 and another value. Masks with more
-    values are cut at one half, which is logged as a warning.
+    values also have alpha; that those whose rims are only antialiased are cut is logged.
 
     A single file holds labels: 0 for the back layer, then 1, 2, ... for objects back to front. The
     index of a palette is the label, whatever its colours; otherwise a grey value is its label, of 8
@@ -82,16 +82,14 @@ def load_masks(path: str | Path, width: int, height: int) -> list[Region]:
     if not path.is_dir():
         file = _read(path, width, height)
         return label_regions(_labels(file, str(path)), str(path))
-    regions, soft = list[Region](), list[str]()
+    regions = list[Region]()
     files = _mask_files(path)
     if not files:
         raise InputError(f"{path}: the mask folder holds no picture; put one mask a layer in it")
     check_count(len(files), f"masks in {path}")
     for name, place in files:
-        mask, several = _region(place, width, height)
-        regions.append(Region(name, mask))
-        soft += [str(place)] * several
-    warn_of_soft(soft)
+        regions.append(Region(name, *_region(place, width, height)))
+    warn_of_cut({str(f): r.alpha for (_, f), r in zip(files, regions, strict=True)})
     return regions
 
 
@@ -109,13 +107,16 @@ def load_mask(path: str | Path, width: int, height: int) -> NDArray[np.bool_]:
     Raises:
         InputError: The file cannot be read, has the wrong size or several pictures, or is faint.
     """
-    mask, soft = _region(Path(path), width, height)
-    warn_of_soft([str(path)] * soft)
+    mask, alpha = _region(Path(path), width, height)
+    if alpha is not None:
+        logging.getLogger(__name__).warning("soft masks are cut at one half: %s", path)
     return mask
 
 
-def _region(file: Path, width: int, height: int) -> tuple[NDArray[np.bool_], bool]:
-    """Inside of the mask in a file, bool [height, width], and whether it is soft."""
+def _region(
+    file: Path, width: int, height: int
+) -> tuple[NDArray[np.bool_], NDArray[np.float32] | None]:
+    """Inside of the mask in a file, bool [height, width], and alpha, if it has other values."""
     content = _read(file, width, height).content
     values = content if isinstance(content, np.ndarray) else _mask(content)
     return inside(values, f"{file}: the mask")

@@ -25,10 +25,13 @@ class Region:
     Attributes:
         name: Name of the layer. ``cat/eye`` is a part of ``cat`` and follows it.
         mask: bool [H, W], True for the pixels of the layer, also where others in front hide it.
+        alpha: float32 [H, W] in 0..1, how much of each pixel belongs to the layer, if that is known
+            better than `mask` says it; or None.
     """
 
     name: str
     mask: NDArray[np.bool_]
+    alpha: NDArray[np.float32] | None = None
 
     @property
     def parent(self) -> str | None:
@@ -68,7 +71,7 @@ def resolve(
         check_size("the support of the picture", support, width, height)
     whole = np.ones((height, width), np.bool_) if support is None else support
     ordered = sorted(regions, key=lambda r: not is_back(r.name))
-    stack = [Region(r.name, r.mask & whole) for r in ordered]
+    stack = [replace(r, mask=r.mask & whole) for r in ordered]
     free = whole.copy()
     for region in stack:
         free &= ~region.mask

@@ -77,11 +77,14 @@ def test_one_array_of_floats_is_a_mask():
 @pytest.mark.parametrize(
     ("top", "kind"), [(1, np.float32), (1, np.float64), (255, np.uint8), (65535, np.uint16)]
 )
-def test_soft_masks_are_cut_at_one_half_and_it_is_said(top, kind, caplog):
-    soft = (np.tile(np.linspace(0, 1, WIDTH), (HEIGHT, 1)) * top).astype(kind)
+def test_masks_with_narrow_rims_are_cut_at_one_half_and_it_is_said(top, kind, caplog):
+    ramp = ((np.arange(WIDTH) - 8.8) / 3).clip(0, 1)
+    soft = (np.tile(ramp, (HEIGHT, 1)) * top).astype(kind)
     (veil, rock) = regions({"veil": soft, "rock": ONE})
     np.testing.assert_array_equal(veil.mask, soft >= (0.5 if top == 1 else (top + 1) // 2))
     np.testing.assert_array_equal(rock.mask, ONE)
+    np.testing.assert_allclose(veil.alpha, np.tile(ramp, (HEIGHT, 1)), atol=0.005)
+    assert rock.alpha is None
     assert [r.getMessage() for r in caplog.records] == ["soft masks are cut at one half: 'veil'"]
 
 

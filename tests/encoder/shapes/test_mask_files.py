@@ -273,8 +273,12 @@ def test_masks_with_palettes(tmp_path, palette, inside):
 
 
 @pytest.mark.parametrize("kind", ["grey", "alpha", "deep", "float", "jpeg"])
-def test_soft_masks_are_cut_at_one_half_and_it_is_said(tmp_path, kind, caplog):
-    soft = np.tile(np.linspace(0, 1, WIDTH), (HEIGHT, 1))
+@pytest.mark.parametrize("steep", [True, False])
+def test_masks_of_many_values_have_alpha_and_that_narrow_rims_are_cut_is_said(
+    tmp_path, kind, steep, caplog
+):
+    ramp = (np.arange(WIDTH) - 12.8) / 3 if steep else np.linspace(0, 1, WIDTH)
+    soft = np.tile(ramp.clip(0, 1), (HEIGHT, 1))
     eight = np.rint(255 * soft).astype(np.uint8)
     values = {
         "grey": eight,
@@ -287,9 +291,13 @@ def test_soft_masks_are_cut_at_one_half_and_it_is_said(tmp_path, kind, caplog):
     save(tmp_path / f"veil.{suffix}", values[kind])
     save(tmp_path / "rock.png", INSIDE * np.uint8(255))
     with caplog.at_level(logging.WARNING):
-        mask = load(tmp_path)["veil"]
-    np.testing.assert_array_equal(mask[:, [0, 10, 18, 28]], np.tile([0, 0, 1, 1], (HEIGHT, 1)))
-    assert len(caplog.records) == 1
+        rock, veil = load_masks(tmp_path, WIDTH, HEIGHT)
+    np.testing.assert_array_equal(veil.mask[:, [0, 10, 18, 28]], np.tile([0, 0, 1, 1], (HEIGHT, 1)))
+    np.testing.assert_allclose(veil.alpha, soft, atol=0.02)
+    assert rock.alpha is None
+    assert len(caplog.records) == steep
+    if not steep:
+        return
     assert f"veil.{suffix}" in caplog.text
     assert "one half" in caplog.text
     assert "rock" not in caplog.text

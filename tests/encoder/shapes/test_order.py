@@ -55,7 +55,7 @@ def test_depth_decides_where_there_is_one():
     behind = behind & ~front
     depth = np.where(behind, 5.0, 1.0).astype(np.float32)
     regions = [Region("front", front), Region("behind", behind)]
-    assert ordered_by_depth(regions, depth, opaque=False)[1].mask is behind
+    assert ordered_by_depth(regions, depth, opaque=False)[1].name == "behind"
 
 
 def test_circles_of_overlaps_end():

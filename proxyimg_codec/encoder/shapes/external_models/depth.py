@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..masks import Region
+from ..amodal import extended_beneath
+from ..masks import Region, visible
 from ..onnx_model import Floats, Model
 from .kinds import Kind, check_kind
 from .pixels import IMAGENET_MEAN, IMAGENET_STD, planes
@@ -61,16 +63,21 @@ def _size(height: int, width: int) -> tuple[int, int]:
 
 
 def ordered_by_depth(regions: Sequence[Region], depth: Floats, opaque: bool) -> list[Region]:
-    """Disjoint regions in the order of their depth, back to front.
+    """Regions in the order of their depth, back to front.
 
     Args:
         regions: The regions, with masks bool [H, W].
         depth: float32 [H, W], larger is nearer.
-        opaque: Whether the first region is the back of an opaque picture, which stays there.
+        opaque: Whether the first region is the back of an opaque picture, which stays there. Then
+            the others may go on beneath those that they are behind of (`amodal`).
     """
-    near = nearness_by_depth(depth, [r.mask for r in regions])
+    masks = visible(regions)
+    near = nearness_by_depth(depth, masks)
     order = sorted(range(len(regions)), key=lambda i: (not (opaque and i == 0), near[i]))
-    return [regions[i] for i in order]
+    masks = [masks[i] for i in order]
+    if opaque:
+        masks = extended_beneath(masks, range(len(masks)))
+    return [replace(regions[i], mask=mask) for i, mask in zip(order, masks, strict=True)]
 
 
 def nearness_by_depth(depth: Floats, masks: Sequence[Mask]) -> list[float]:
