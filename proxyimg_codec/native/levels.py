@@ -7,7 +7,6 @@ tells what a processor lacks for one.
 from __future__ import annotations
 
 import ctypes as ct
-import functools
 import os
 from pathlib import Path
 from typing import NamedTuple
@@ -35,7 +34,6 @@ class Choice(NamedTuple):
         return f"core: {self.level}" + (f" ({self.why})" if self.why else "")
 
 
-@functools.cache
 def chosen() -> Choice:
     """Loads the library, and chooses the best level that the processor runs.
 

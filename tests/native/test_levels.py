@@ -25,19 +25,15 @@ PICTURES = {
 def choose(monkeypatch):
     """A function that chooses a level, as a new process does."""
 
-    def clear():
-        levels.chosen.cache_clear()
-        kernel.library.cache_clear()
-
     def chosen(name):
         monkeypatch.setenv("PROXYIMG_CORE", name)
         monkeypatch.delenv("PROXYIMG_NO_KERNEL", raising=False)
-        clear()
+        kernel.library.cache_clear()
         return levels.chosen()
 
     yield chosen
     monkeypatch.undo()
-    clear()
+    kernel.library.cache_clear()
 
 
 def pixels(name):

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import msgpack
 
+from proxyimg_codec.container import plan
 from proxyimg_codec.container.chunks import write
 from proxyimg_codec.model import Picture
 
@@ -14,9 +15,10 @@ from ..builders import Numbers, values
 from ..valid.mattes import softened
 from ..valid.views import pieces
 from .base import Base, Row, refused
+from .behind import short
 from .pyramids import different
 
-HEAD, BACK, DISC, BAR, PLAN, OWN, MATTE, BACK_TEXR, DISC_TEXR, BAR_TEXR, TAIL = range(11)
+HEAD, BACK, DISC, BAR, BACK_TEXR, DISC_TEXR, BAR_TEXR, PLAN, OWN, MATTE, TAIL = range(11)
 """Positions of the chunks in the base file."""
 
 
@@ -36,7 +38,10 @@ def _version(version: tuple[int, int], count: int) -> Callable[[Base], bytes]:
         for at in (BACK_TEXR, DISC_TEXR, BAR_TEXR):
             kept = list(values(different(b, at, behind=0, matte=0)).values())
             chunks[at] = replace(chunks[at], payload=msgpack.packb(kept[:count]))
-        return write(chunks[:OWN] + chunks[BACK_TEXR:], version)
+        layers, textures = chunks[:BACK_TEXR], chunks[BACK_TEXR:PLAN]
+        if version < plan.TILED_FROM:
+            return write([*layers, short(chunks[PLAN]), *textures, chunks[TAIL]], version)
+        return write([*layers, *textures, chunks[PLAN], chunks[TAIL]], version)
 
     return build
 
