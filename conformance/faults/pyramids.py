@@ -223,7 +223,7 @@ def _everywhere_behind(self: PyramidTexture, trusted: Any) -> Any:
 
 bands_of, mirrored_of, level_of = Grid.bands, grid.mirrored_indices, LevelCoder.__init__
 grid_of, wave_of, escape_of = Grid.of, LevelCoder._wave, latents.Decoder._escape
-position_of, samples_of = pyramid._position, PyramidTexture._samples
+position_of, samples_of = pyramid.position, PyramidTexture._samples
 unpack_of, premultiplied_of = pyramid.unpack, compose.premultiplied
 moved_of, known_of = Occlusion.moved, PyramidTexture._known
 still_of, neighbours_of = Pose.still, neighbours.moved_neighbours
@@ -256,10 +256,10 @@ _FAULTS: dict[str, list[Patch]] = {
     "escapes-unsigned": [(latents.Decoder, "_escape", _unsigned)],
     "accepts-left-over-escapes": [(latents.Decoder, "finish", lambda self, where: None)],
     "accepts-large-latents": [(context, "LIMIT", 1 << 20)],
-    "nearest-sample": [(pyramid, "_position", _nearest)],
-    "linear": [(pyramid, "_weights", _linear)],
-    "cubic-sharp": [(pyramid, "_weights", _sharp)],
-    "samples-on-corners": [(pyramid, "_position", _corners)],
+    "nearest-sample": [(pyramid, "position", _nearest)],
+    "linear": [(pyramid, "keys_weights", _linear)],
+    "cubic-sharp": [(pyramid, "keys_weights", _sharp)],
+    "samples-on-corners": [(pyramid, "position", _corners)],
     "interpolates-straight": [(PyramidTexture, "_samples", _straight),
         (compose, "premultiplied", _premultiplied)],
     "ignores-part": [(pyramid, "unpack", _whole)],

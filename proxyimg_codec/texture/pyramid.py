@@ -242,8 +242,8 @@ class PyramidTexture:
         Raises:
             FormatError: The planes are corrupt.
         """
-        column, fx = _position(x, box[0], box[2], self.part[2])
-        row, fy = _position(y, box[1], box[3], self.part[3])
+        column, fx = position(x, box[0], box[2], self.part[2])
+        row, fy = position(y, box[1], box[3], self.part[3])
         if not (fx.any() or fy.any()):
             return self._samples(row, column, moved)
         padded = self.padded(moved)
@@ -325,7 +325,7 @@ def _samples(mask: NDArray[np.bool_], cell: int, part: Box) -> Samples:
 def _interpolated(padded: Floats, first: NDArray[np.intp], fx: Floats, fy: Floats) -> Floats:
     """Colours [n, C] at fractions fx, fy [n] of the 4x4 samples that begin with `first` [n]."""
     samples = padded.reshape(-1, padded.shape[2])
-    across, down = _weights(fx), _weights(fy)
+    across, down = keys_weights(fx), keys_weights(fy)
     total = np.zeros((len(first), samples.shape[1]), np.float32)
     for j in range(TAPS):
         part = np.zeros_like(total)
@@ -335,7 +335,7 @@ def _interpolated(padded: Floats, first: NDArray[np.intp], fx: Floats, fy: Float
     return total
 
 
-def _position(
+def position(
     points: NDArray[np.float64], start: int, extent: int, samples: int
 ) -> tuple[NDArray[np.intp], Floats]:
     """Index of the sample before each point along one axis, and the fraction to the next sample."""
@@ -347,7 +347,7 @@ def _position(
     return before, at.astype(np.float32)
 
 
-def _weights(f: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+def keys_weights(f: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """Weights of four neighbouring samples for points at the fractions f [N] after the second one.
 
     They add up to 1. At f = 0 they are exactly 0, 1, 0, 0.
