@@ -195,11 +195,12 @@ def pipeline_guide(path: Path, wishes: Wishes) -> LatentGuide:
             f"a pipeline as guide needs {error.name or 'diffusers'}: "
             "pip install 'proxyimg-codec[generate]'"
         ) from None
-    unused = {k: None for k in ("safety_checker", "image_encoder") if k in index}
+    unused: dict[str, Any] = {k: None for k in ("safety_checker", "image_encoder") if k in index}
     try:
-        pipe = DiffusionPipeline.from_pretrained(
-            path, torch_dtype=kind, local_files_only=True, **unused
-        )
+        with _silent():
+            pipe = DiffusionPipeline.from_pretrained(
+                path, dtype=kind, local_files_only=True, **unused
+            )
         words = _words(pipe, settings.prompt, settings.negative)
         scheduler = DDPMScheduler.from_config(pipe.scheduler.config)
         vae, unet = pipe.vae, pipe.unet
@@ -216,6 +217,25 @@ def pipeline_guide(path: Path, wishes: Wishes) -> LatentGuide:
     return LatentGuide(
         vae, unet, scheduler, words, guidance, settings.weighting, kind, device, wishes.run.offload
     )
+
+
+@contextmanager
+def _silent() -> Iterator[None]:
+    """Keeps the packages from drawing progress bars, and from giving advice, while it lasts."""
+    from diffusers.utils import logging as first
+    from transformers.utils import logging as second
+
+    before = [(log, log.get_verbosity(), log.is_progress_bar_enabled()) for log in (first, second)]
+    for log, _, _ in before:
+        log.set_verbosity_error()
+        log.disable_progress_bar()
+    try:
+        yield
+    finally:
+        for log, verbosity, bar in before:
+            log.set_verbosity(verbosity)
+            if bar:
+                log.enable_progress_bar()
 
 
 def _index(path: Path) -> Mapping[str, Any]:

@@ -29,7 +29,8 @@ class Careful:
 
     def _convert(self, kind: torch.dtype) -> None:
         for module in self._modules:
-            module.to(kind)
+            if any(p.dtype != kind for p in module.parameters()):
+                module.to(kind)
 
     def __call__(
         self, attempt: Callable[[torch.dtype], tuple[Tensor, Tensor]]
