@@ -26,7 +26,7 @@ def add_generate(p: argparse.ArgumentParser) -> None:
                        "of a denoiser, a picture, or the name of a plug-in")  # fmt: skip
     group.add_argument("--negative", metavar="PROMPT", help="what the texture does not show")
     group.add_argument("--guidance", type=float, metavar="F", help="how many times the difference "
-                       "counts that the prompt makes; default 7.5, diffusers 30")  # fmt: skip
+                       "counts that the prompt makes; default 15, diffusers 30")  # fmt: skip
     group.add_argument("--steps", type=int, metavar="N", help="steps of the optimizer; default 400")
     group.add_argument(
         "--seed", type=int, metavar="N", help="seed of all random numbers; default 0"

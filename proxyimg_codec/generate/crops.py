@@ -61,7 +61,9 @@ def crops(
     shift = 2 * centre / unit - 1
     theta = torch.stack([torch.cat([across, shift[:, :1]], 1),
                          torch.cat([down, shift[:, 1:]], 1)], 1)  # fmt: skip
-    reduction = min(max(math.ceil(FAR * longest / side), 1), REDUCTION_MAX)
+    # Each sample is interpolated from two across and two down.
+    reduction = math.ceil(float(share.max()) * longest / (2 * side))
+    reduction = min(max(reduction, 1), REDUCTION_MAX)
     size = [count, 4, side * reduction, side * reduction]
     grid = F.affine_grid(theta, size, align_corners=False).to(image)
     planes = torch.cat([image, scene.share.to(image)[None]])[None].expand(count, -1, -1, -1)

@@ -123,7 +123,7 @@ class Distillation:
         self._parameters, self._scene, self._guide = parameters, scene, guide
         self._settings, self._run = settings, run
         self._side = settings.resolution or guide.side
-        self._adam = torch.optim.Adam(parameters.groups(), betas=(0.9, 0.99))
+        self._adam = torch.optim.AdamW(parameters.groups(), betas=(0.9, 0.99), weight_decay=0.0)
         self._rates = [group["lr"] for group in self._adam.param_groups]
         self._random = torch.Generator().manual_seed(settings.seed)
         self.step, self.losses = 0, list[float]()

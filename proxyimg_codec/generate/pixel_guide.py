@@ -14,7 +14,7 @@ from .denoiser import load
 from .guide import Batch, Judged, Wishes, device_of
 from .precision import TYPES, Careful
 
-GUIDANCE = 7.5
+GUIDANCE = 15.0
 """Guidance where the settings have none."""
 
 Predict = Callable[[Tensor, Tensor, bool], Tensor]

@@ -26,8 +26,12 @@ from .scene import Scene
 RATE = 5.0
 """Learning rate: how far, in levels of 8 bits, a step of the latents of one level moves samples."""
 
-FINE = 0.8
+FINE = 0.75
 """Factor of the learning rate from one level to the next finer one."""
+
+FADING = 0.003
+"""Share of the latents, but those of the lowest planes, that fades in a step: what the guide does
+not ask for costs bits."""
 
 RIM = 3
 """Samples beyond the outline that get the colours continued, for the interpolating kernel."""
@@ -91,7 +95,9 @@ class PyramidParameters:
                 moved = float((self._raster(trial) - base).square().mean().sqrt()) * 255
                 level = min(k + 1, len(self._latents) - 1)
                 slow = FINE ** (len(self._latents) - 1 - level)
-                found.append({"params": [own], "lr": RATE * slow / max(moved, 1e-3)})
+                rate = RATE * slow / max(moved, 1e-3)
+                fading = FADING / rate if k + 1 < len(self._latents) else 0.0
+                found.append({"params": [own], "lr": rate, "weight_decay": fading})
         return found
 
     def _raster(self, latents: list[Tensor]) -> Tensor:

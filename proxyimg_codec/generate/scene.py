@@ -59,6 +59,7 @@ class Scene:
         x: float64 [n] x of the texture points that they show, in canvas pixels at rest.
         y: float64 [n] y of these points.
         box: x0, y0, x1, y1 of the layer, in pixels of the scene.
+        region: Part of the canvas that the scene shows: x, y, width, height.
         matrix: float32 [3, 4] colour matrix of the layer's pose; None for none.
     """
 
@@ -68,6 +69,7 @@ class Scene:
     x: Reals
     y: Reals
     box: tuple[int, int, int, int]
+    region: tuple[int, int, int, int]
     matrix: Tensor | None
 
     def image(self, colours: Tensor) -> Tensor:
@@ -123,7 +125,8 @@ def scene_of(picture: Picture, layer: Layer, most: int) -> Scene:
     return Scene(
         torch.from_numpy(np.ascontiguousarray(black.transpose(2, 0, 1))), torch.from_numpy(share),
         torch.from_numpy(index), x.ravel()[index], y.ravel()[index],
-        (int(columns.min()), int(rows.min()), int(columns.max()) + 1, int(rows.max()) + 1), matrix,
+        (int(columns.min()), int(rows.min()), int(columns.max()) + 1, int(rows.max()) + 1),
+        region, matrix,
     )  # fmt: skip
 
 
