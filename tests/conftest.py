@@ -26,6 +26,7 @@ ENCODE = ("cv2", "imagecodecs", "OpenImageIO", "onnx", "onnxruntime", "PIL", "to
 
 KINDS = {
     "encoder": ("encoder", ENCODE),
+    "generate": ("encoder", ENCODE),
     "training": ("encoder", ENCODE),
     "benchmarks": ("encoder", ENCODE),
     "bench": ("encoder", (*ENCODE, "matplotlib")),

@@ -82,6 +82,10 @@ def folder(tmp_path_factory):
     onnx_models.write(path / "u2netp.onnx", onnx_models.figures())
     onnx_models.write(path / "depth.onnx", onnx_models.depth())
     onnx_models.write(path / "lama.onnx", onnx_models.inpainting("64, 64", 255))
+    from proxyimg_codec.generate import denoiser
+
+    classes = ("flags", "food")
+    denoiser.save(path / "denoiser.pt", denoiser.Denoiser(denoiser.Shape(32, (8, 8), classes)))
     edits = [{"op": "move", "layer": "cat", "by": [3, 4]}]
     (path / "edits.json").write_text(json.dumps({"version": 1, "edits": edits}))
     return path

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import UsageError
 from .common import add_limits, limits_of, parser, printable, run, warnings_shown
 from .edit_flags import Values, add_edits, guarded, unguarded
+from .generate_flags import add_generate, watched, with_settings
 from .places import (
     add_force_suffix,
     check_suffix,
@@ -29,7 +30,7 @@ from .places import (
 if TYPE_CHECKING:
     from ..model import Picture
 
-ENCODED = ("texture", "insert")
+ENCODED = ("texture", "insert", "generate")
 """Operations that may encode a picture file."""
 
 
@@ -46,6 +47,7 @@ def arguments() -> argparse.ArgumentParser:
                    "standard input; .pxi file, which may be IN with --force, - for standard "
                    "output, or another picture file, to draw it as pxi-decode does")  # fmt: skip
     add_edits(p)
+    add_generate(p)
     p.add_argument(
         "-e",
         "--effort",
@@ -80,7 +82,7 @@ def edit_file(args: argparse.Namespace) -> None:
         PxiError: Anything that goes wrong, as the class that decides the exit code.
     """
     args.input, args.output = in_and_out(args.files)
-    operations = [edit.values() for edit in args.edits]
+    operations = with_settings(args, [edit.values() for edit in args.edits])
     _check(args, operations)
     if args.effort is not None:
         operations = [v | {"effort": args.effort} if v.get("op") in ENCODED else v
@@ -92,7 +94,8 @@ def edit_file(args: argparse.Namespace) -> None:
 
     started = time.perf_counter()
     before = from_file(args.input, limits_of(args))
-    picture = _edited(before, operations, args.quiet)
+    with watched(args):
+        picture = _edited(before, operations, args.quiet)
     if args.bake:
         picture = replace(picture, history=())
     if args.purge:
@@ -175,12 +178,13 @@ def _check(args: argparse.Namespace, operations: Sequence[Values]) -> None:
 
 
 def _files_of(args: argparse.Namespace, operations: Sequence[Values]) -> list[str]:
-    """Files that edits read: scripts, masks, and the sources of textures and outlines."""
+    """Files that edits read: scripts, masks, guides, and sources of textures and outlines."""
     edits = [edit for values in operations for edit in values.get("script", [values])]
-    read = ("source", "mask")
+    read = ("source", "mask", "guide")
     sources = [edit.get(key) for edit in edits if isinstance(edit, Mapping) for key in read]
     scripts = [edit.words[0] for edit in args.edits if edit.flag == "--script"]
-    return [*scripts, *(v for v in sources if isinstance(v, str) and "\0" not in v)]
+    kept = [args.resume] if args.resume else []
+    return [*scripts, *kept, *(v for v in sources if isinstance(v, str) and "\0" not in v)]
 
 
 def _edited(picture: Picture, operations: Sequence[Values], quiet: bool) -> Picture:

@@ -212,6 +212,10 @@ def _texture(text: str) -> Values:
     return {**values, "source": file or key(source), **layer}
 
 
+def _generate(layer: str, prompt: str) -> Values:
+    return {"op": "generate", "layer": key(layer), "prompt": prompt}
+
+
 def _foreign(source: str) -> tuple[str, Values]:
     """Splits FILE.pxi:LAYER into the file, or nothing, and the parameter `from_layer`."""
     parts = re.fullmatch(r"(.+?\.pxi):(.+)", source, re.IGNORECASE)
@@ -333,6 +337,8 @@ FLAGS = (
     Flag("--texture", _texture, ["NAME=SOURCE"],
         "texture of another layer, of a .pxi file (FILE.pxi:LAYER) or of a picture; with @shape by "
         "outlines instead of boxes"),
+    Flag("--generate", _generate, ["NAME", "PROMPT"],
+        "texture from words, made by the model that --guide names"),
     Flag("--recolour", _recolour, ["NAME", "CHANGE"],
         "hue:DEG, saturation:F, brightness:F, #rrggbb (shades of a colour); several with commas"),
     Flag("--group", _group, ["NAME=A,B,..."], "put layers into a group"),

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar
 
 if TYPE_CHECKING:
+    from ..generate.run import Run
     from ..model import Picture
 
 Pair = tuple[float, float]
@@ -320,6 +321,53 @@ class Editable(Generic[Edited]):
             effort: How hard the encoder tries with a picture file, 1..9; by default 2.
         """
         return self._edited("texture", source=source, from_layer=layer, fit=fit, effort=effort)
+
+    def generated(
+        self,
+        prompt: str,
+        *,
+        guide: str,
+        negative: str | None = None,
+        guidance: float | None = None,
+        steps: int | None = None,
+        seed: int | None = None,
+        resolution: int | None = None,
+        times: Pair | None = None,
+        weighting: str | None = None,
+        clip: float | None = None,
+        precision: str | None = None,
+        keep_structure: float | None = None,
+        effort: int | None = None,
+        run: Run | None = None,
+    ) -> Edited:
+        """Gives the layer a new texture, made from words or after a picture; its shape stays.
+
+        What is None is as in `generate.settings.Settings`, which says what each parameter means.
+
+        Args:
+            prompt: What the texture shows; may be empty if the guide is a picture.
+            guide: Folder or file of a model, a picture file, or the name of a plug-in.
+            negative: What the texture does not show.
+            guidance: How many times the difference that the prompt makes counts.
+            steps: Steps of the optimizer.
+            seed: Seed of all random numbers.
+            resolution: Rows and columns of what the guide sees.
+            times: Least and greatest share of the timesteps, within 0..1.
+            weighting: ``sds`` or ``uniform``.
+            clip: Greatest root mean square of the gradient of a picture.
+            precision: ``full``, ``half`` or ``bfloat``.
+            keep_structure: How strongly edges of the old texture stay.
+            effort: How hard the result is encoded, 1..9.
+            run: Where it is computed, and who watches; by default on the CPU, unwatched.
+        """
+        from ..generate.run import present, running
+
+        values = {"negative": negative, "guidance": guidance, "steps": steps, "seed": seed,
+                  "resolution": resolution, "times": None if times is None else list(times),
+                  "weighting": weighting, "clip": clip, "precision": precision,
+                  "keep_structure": keep_structure, "effort": effort}  # fmt: skip
+        with running(run or present()):
+            return self._edited("generate", prompt=prompt, guide=guide, **values)
 
     def with_parent(self, parent: str | int | None) -> Edited:
         """Lets the layer follow another layer, by name or position, or a group; None for none."""

@@ -60,6 +60,8 @@ KINDS: dict[str, dict[str, Any]] = {
     "flag": {"type": "boolean"},
     "axis": {"enum": ["horizontal", "vertical"]},
     "fit": {"enum": ["box", "shape"]},
+    "weighting": {"enum": ["sds", "uniform"]},
+    "precision": {"enum": ["full", "half", "bfloat"]},
     "colour": {"type": "string", "pattern": "^#[0-9a-fA-F]{6}$"},
 }
 """JSON schema of each kind of parameter, by the name of the kind. A `layer` is one of the picture,

@@ -11,6 +11,7 @@ Kinds:
     depth: `(rgb) -> float32 [H, W]`, larger is nearer; any scale.
     inpainters: `(picture, hole) -> float32 [H, W, 3]`, both of them in 0..1: the picture with other
         colours where hole, bool [H, W], is True.
+    guides: `(wishes) -> Guide`, as in `generate.guide`: what new textures are made by.
     meshers: `(boundary, size, edge) -> Base`, as `geometry.mesher.delaunay`.
     engines: `(texture, network, taps) -> float32 [N, channels]`, as `render.engines.run_numpy`.
     handles: `(picture) -> Image`: what functions below `api` give to those who call them directly.
@@ -37,6 +38,7 @@ BUILT_IN: dict[str, dict[str, str]] = {
     },
     "depth": {},
     "inpainters": {},
+    "guides": {},
     "meshers": {
         "delaunay": "proxyimg_codec.geometry.mesher:delaunay",
         "triwild": "proxyimg_codec.encoder.shapes.external_meshers:triwild",

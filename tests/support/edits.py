@@ -96,6 +96,11 @@ BAD = [
     ({"op": "texture", "layer": "disc", "source": "nothing.png"}, "neither a layer"),
     ({"op": "texture", "layer": "disc", "source": "bar", "from_layer": "x"}, "pxi"),
     ({"op": "texture", "layer": "disc", "source": "bar", "fit": "tight"}, "fit"),
+    ({"op": "generate", "layer": "disc", "prompt": "fur"}, "guide is missing"),
+    ({"op": "generate", "layer": "disc", "prompt": "fur", "guide": "a", "seed": "x"}, "seed"),
+    ({"op": "generate", "layer": "disc", "prompt": "fur", "guide": "a", "steps": 0}, "steps is 0"),
+    ({"op": "generate", "layer": "disc", "prompt": "fur", "guide": "a", "times": [0.5, 0.5]},
+     "times"),
 ]  # fmt: skip
 
 

@@ -1,0 +1,1 @@
+"""New textures from words: score distillation on the texture of one layer."""
