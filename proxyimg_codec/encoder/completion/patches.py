@@ -40,9 +40,6 @@ LEAST = 4.0
 FEW = 300
 """Fewest whole patches to choose from at the coarsest level."""
 
-TRIALS = 4
-"""Times that the coarsest level begins at random; the best one goes on."""
-
 MOST = 12000
 """Most patches of a level; finer levels are left out."""
 
@@ -79,8 +76,7 @@ def guessed(features: Floats, known: Pixels, hole: Pixels, seed: int) -> Guess:
     """
     rng = np.random.default_rng([seed, 17])
     *finer, coarsest = _levels(features, known, hole)
-    tried = [_found(_Level(*coarsest), None, ROUNDS[0], rng) for _ in range(TRIALS)]
-    found, scale = min(tried, key=lambda level: float(level.apart.mean())), 2 ** len(finer)
+    found, scale = _found(_Level(*coarsest), None, ROUNDS[0], rng), 2 ** len(finer)
     for number, planes in enumerate(reversed(finer), 1):
         level = _Level(*planes)
         if len(level.rows) > MOST:
