@@ -350,6 +350,7 @@ _FAULTS: dict[str, list[Patch]] = {
     "copies-without-lifts": [(completion, "lifts_of", lambda copier: 0 * lifts_of(copier))],
     "copies-lifted-once": [(lifts, "TURNS", 1)],
     "copies-lifted-without-bound": [(lifts, "LIFT", 1 << 20)],
+    "copies-linked-though-apart": [(lifts, "APART", 1 << 20)],
     "copies-without-rim": [(completion, "diffused", lambda value, *how: 0 * value)],
     "copies-not-clamped": [(completion, "FILL_ONE", 1 << 30)],
     "trusts-samples-near": [(occlusion, "REACH", 1)],

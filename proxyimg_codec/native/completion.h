@@ -22,7 +22,7 @@ struct Cell {
 
 // Lifts of cells, so that neighbours agree in light.
 class Lifts {
-    static constexpr int64_t LIMIT = 24 << 8, MOST = 32640, TURNS = 64, RIM_WEIGHT = 4;
+    static constexpr int64_t LIMIT = 24 << 8, APART = 48 << 8, MOST = 32640, TURNS = 64, RIM_WEIGHT = 4;
 
     const Copies &s;
     const int side, channels, height, width;
@@ -32,8 +32,8 @@ class Lifts {
     std::vector<uint8_t> linked[2];        // [cells] to the right one, to the lower one
     std::vector<int64_t> lift;             // [cells][channels]
 
-    // Means of what one shift finds over what another one does, in a square of the part; returns how
-    // many samples both find, or 0 where a mean is more than a drift of light.
+    // Means of what one shift finds over what another one does, bounded, in a square of the part; returns
+    // how many samples both find, or 0 where they are apart.
     int64_t compared(int top, int left, int size, const int *one, const int *other, int64_t *out) const {
         const int y0 = std::max({top, 0, -one[1], -other[1]}), x0 = std::max({left, 0, -one[0], -other[0]});
         const int y1 = std::min({top + size, height, height - one[1], height - other[1]});
@@ -56,8 +56,13 @@ class Lifts {
             }
         }
         const int64_t twice = std::max<int64_t>(2 * count, 1);
-        for (int c = 0; c < channels; c++) out[c] = floor_divided(2 * out[c] + count, twice);
-        if (std::all_of(out, out + channels, [](int64_t v) { return std::abs(v) <= LIMIT; })) return count;
+        bool apart = false;
+        for (int c = 0; c < channels; c++) {
+            out[c] = floor_divided(2 * out[c] + count, twice);
+            apart |= std::abs(out[c]) > APART;
+            out[c] = std::clamp(out[c], -LIMIT, LIMIT);
+        }
+        if (!apart) return count;
         std::fill_n(out, channels, 0);
         return 0;
     }

@@ -77,8 +77,7 @@ def compose(
     sx, sy = view.supersampling
     samples = len(layers) * view.width * sx * view.height * sy
     budget.spend("multiply_adds", samples << SAMPLE_COST_BITS)
-    views = [v.texture for v in layers if isinstance(v.texture, PyramidTexture)]
-    solid = all(v.alpha is None for v in views)
+    solid = all(map(_is_solid, layers, moved))
     painters = [
         _Painter(picture, layer, apart, solid, view, engine, budget, cache)
         for layer, apart in zip(reversed(layers), reversed(moved), strict=True)
@@ -119,6 +118,16 @@ def _tile(painters: Sequence[_Painter], box: Rectangle) -> Floats:
         result[rows] += weight[:, None] * colour
         clear[rows] *= 1 - covered * colour[:, 3]
     return result.reshape(h, w, 4)
+
+
+def _is_solid(layer: Layer, moved: Moved) -> bool:
+    """Whether nothing shows through a layer where its boundary covers all."""
+    texture = layer.texture
+    if not isinstance(texture, PyramidTexture):
+        return True
+    own = texture.cuts is not None and texture.cuts.own is not None
+    soft = texture.matte is not None and not (own and moved == ALL_IN_PLACE)
+    return texture.alpha is None and not soft
 
 
 class _Painter:

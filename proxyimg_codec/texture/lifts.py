@@ -12,8 +12,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-LIFT = 24 << 8
-"""Largest difference that counts, in 1/256 level: what differs more is another thing."""
+LIFT, APART = 24 << 8, 48 << 8
+"""Largest difference that counts, in 1/256 level; what is more than `APART` is another thing."""
 
 LIFT_MOST = 32640
 """Largest lift, so that sums stay below 2^31."""
@@ -152,12 +152,12 @@ def _between(
 
 
 def _mean(differ: Values, where: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Means [C, n] of differences [C, n, h, w] over some samples, and the number of these.
+    """Means [C, n] of differences [C, n, h, w] over some samples, bounded, and their number.
 
-    Where a component differs more than drifts of light do, nothing is compared: both are 0.
+    Where those of a component are `APART`, both are 0.
     """
     count = where.sum((1, 2)).astype(np.int64)
     total = (differ.astype(np.int64) * where).sum((2, 3))
     mean = (2 * total + count) // np.maximum(2 * count, 1)
-    alike = (np.abs(mean) <= LIFT).all(0)
-    return mean * alike, count * alike
+    alike = (np.abs(mean) <= APART).all(0)
+    return np.clip(mean, -LIFT, LIFT) * alike, count * alike

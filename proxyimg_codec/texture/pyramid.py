@@ -316,9 +316,7 @@ class PyramidTexture:
     ) -> Floats:
         """Premultiplied samples [N, `channels`] at rows and columns [N], filled and unmixed."""
         x, y, width, _ = self.part
-        # What hides samples does not hide those of soft rims, which another layer shows through.
-        kept = None if seen and self.matte is None else self.kept(moved)
-        soft = None
+        kept, soft = None if seen and self.matte is None else self.kept(moved), None
         window = Window(
             int(row.min()) + y, int(row.max()) + y + 1,
             int(column.min()) + x, int(column.max()) + x + 1,

@@ -170,6 +170,7 @@ CAUGHT = {
     "copies-without-lifts": ("copies", "pixels", "copies-none"),
     "copies-lifted-once": ("copies", "pixels", "copies-none"),
     "copies-lifted-without-bound": ("copies", "pixels", "copies-none"),
+    "copies-linked-though-apart": ("copies", "pixels", "copies-none"),
     "copies-without-rim": ("copies", "pixels", "copies-no-rim"),
     "copies-not-clamped": ("copies-clamped", "pixels", "copies-no-rim"),
     "ignores-motion": ("moves-loop", "pixels", "moved"),

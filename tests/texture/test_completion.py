@@ -15,7 +15,7 @@ from proxyimg_codec.native import kernel
 from proxyimg_codec.texture import completion
 from proxyimg_codec.texture.completion import DRIFT, FILL_ONE, Copies, completed, unpack
 from proxyimg_codec.texture.diffusion import diffused
-from proxyimg_codec.texture.lifts import LIFT, LIFT_MOST, RIM_WEIGHT, TURNS
+from proxyimg_codec.texture.lifts import APART, LIFT, LIFT_MOST, RIM_WEIGHT, TURNS
 from tests.support.pyramids import planes, view
 
 ENGINES = ("numpy", "auto")
@@ -56,7 +56,8 @@ def mean_of(pairs):
         return None
     sums = [sum(int(a[c]) - int(b[c]) for a, b in pairs) for c in range(len(pairs[0][0]))]
     means = [nearest(v, len(pairs)) for v in sums]
-    return means if all(abs(v) <= LIFT for v in means) else None
+    apart = any(abs(v) > APART for v in means)
+    return None if apart else [min(max(v, -LIFT), LIFT) for v in means]
 
 
 def lifts_by_the_rule(values, known, references):

@@ -11,7 +11,7 @@ export const FILL_ONE = 65280;
 const DRIFT = 3072;
 
 /** The largest difference of copies that counts, the largest lift, and the rounds of balancing. */
-const [LIFT, LIFT_MOST, TURNS] = [6144, 32640, 64];
+const [LIFT, APART, LIFT_MOST, TURNS] = [6144, 12288, 32640, 64];
 
 /** The array of sources: channels, rows, columns and bits (PYR-48). */
 export function sourcesShape({ part, grain, offsets }) {
@@ -70,7 +70,8 @@ function liftsOf(texr, sources, values, known) {
       }
     }
     const means = sums.map((sum) => (count ? quotient(sum, count) : 0));
-    return means.some((mean) => Math.abs(mean) > LIFT) ? [means, 0] : [means, count];
+    const bounded = means.map((mean) => clamp(mean, -LIFT, LIFT));
+    return [bounded, means.some((mean) => Math.abs(mean) > APART) ? 0 : count];
   };
   const cells = [...sources.keys()].filter((k) => sources[k]);
   const links = new Map(cells.map((k) => [k, []]));

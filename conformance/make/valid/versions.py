@@ -52,20 +52,15 @@ def _version_0_9(n: Numbers) -> bytes:
        "pyramid: cuts")  # fmt: skip
 def _version_0_10(n: Numbers) -> bytes:
     """With what was possible in it alone."""
-    return write(_before_0_12(n, 7), (0, 10))
-
-
-def _before_0_12(n: Numbers, count: int) -> list[Chunk]:
-    """Chunks of a picture whose pyramid textures have the first `count` values."""
-    return [
-        replace(c, payload=msgpack.packb(msgpack.unpackb(c.payload)[:count]))
-        if c.type == "TEXR" else c
+    chunks = [
+        replace(c, payload=msgpack.packb(msgpack.unpackb(c.payload)[:7])) if c.type == "TEXR" else c
         for c in planes_first(to_bytes(pieces(n, {"disc": Pose(shift=(3 * 1024, -900))})))
-    ]  # fmt: skip
+    ]
+    return write(chunks, (0, 10))
 
 
 def planes_first(data: bytes) -> list[Chunk]:
-    """Chunks of a file as they were before 0.12: PLAN is short, and stands before TEXR.
+    """Chunks of a file as they were in 0.11: PLAN is short, and stands before TEXR without matte.
 
     Args:
         data: File of the present version.
@@ -75,6 +70,8 @@ def planes_first(data: bytes) -> list[Chunk]:
         if chunk.type == plan.TYPE:
             *values, _, _, escapes, stream = msgpack.unpackb(chunk.payload)
             chunk = replace(chunk, payload=msgpack.packb([*values, escapes, stream]))
+        elif chunk.type == "TEXR":
+            chunk = replace(chunk, payload=msgpack.packb(msgpack.unpackb(chunk.payload)[:13]))
         chunks.append(chunk)
     order = ["HEAD", "LAYR", "MESH", "POSE", "NETW", "PLAN", "TEXR"]
     return sorted(chunks, key=lambda c: order.index(c.type) if c.type in order else len(order))
@@ -83,7 +80,8 @@ def planes_first(data: bytes) -> list[Chunk]:
 @_case("A file of version 0.11, whose pyramid textures end with unmix", "file: version", "CON-19",
        "CON-20", "pyramid: cuts")  # fmt: skip
 def _version_0_11(n: Numbers) -> bytes:
-    return write(_before_0_12(n, 13), (0, 11))
+    moved = pieces(n, {"disc": Pose(shift=(3 * 1024, -900))})
+    return write(planes_first(to_bytes(moved)), (0, 11))
 
 
 @_case("A file of version 0.2 with arrays", "file: version", "fields: maps")
