@@ -1,0 +1,216 @@
+"""pxi-bench paper: sections, resuming, and the report."""
+
+import json
+from functools import partial
+
+import numpy as np
+import pytest
+
+from proxyimg_codec.bench import workers
+from proxyimg_codec.bench.paper import SECTIONS, items, report, resolution, run, store
+from proxyimg_codec.bench.paper import implicit as implicit_section
+from proxyimg_codec.bench.paper.ours import SHAPE, grid_of
+from proxyimg_codec.bench.paper.tables import Column, Table
+from proxyimg_codec.bench.rivals import sines
+from proxyimg_codec.errors import InputError
+from proxyimg_codec.io import raster
+from tests.support.pictures import smooth
+
+TINY = items.Effort(1, 37, 48, 30, 5, 2, 4, 1)
+
+
+@pytest.fixture
+def data(tmp_path):
+    folder = tmp_path / "data"
+    (folder / "kodak").mkdir(parents=True)
+    for name, (width, height) in (("a", (37, 41)), ("b c", (50, 45))):
+        raster.write(folder / "kodak" / f"{name}.png", smooth(width, height))
+    return folder
+
+
+@pytest.fixture
+def here(monkeypatch):
+    """Measures in this process, with little effort."""
+    monkeypatch.setattr(workers, "run", lambda work, tasks, jobs, finished: [
+        finished(work(task)) for task in tasks])  # fmt: skip
+    monkeypatch.setattr(items, "QUICK", TINY)
+
+
+def rows_of(out, section):
+    found = sorted((out / "items" / section).iterdir())
+    return [row for path in found for row in json.loads(path.read_bytes())["rows"]]
+
+
+def test_a_run_from_pictures_to_a_report(tool, data, tmp_path, here):
+    out = tmp_path / "out"
+    tool("bench", "paper", "--data", data, "--out", out, "--quick", "--only", "implicit")
+    rows = rows_of(out, "implicit")
+    count = sines.count(48, 4)
+    named = {(r["method"], r["fit"]) for r in rows}
+    rivals = ("SIREN, 3 layers", "COIN", "hash grid", "2-D Gaussians", "LIIF-like grid")
+    for rival in ("SIREN, 5 layers", *rivals):
+        assert {(rival, "converged"), (rival, "equal time")} <= named
+    assert {m for m, _ in named} >= {"pxi direct", "pxi node", "pxi pyramid"}
+    assert {r["picture"] for r in rows} == {"a"}
+    counts = [r["parameters"] for r in rows if r["method"] in rivals]
+    assert all(0.8 * count < n <= count for n in counts)
+    text = (out / "report.md").read_text()
+    assert text.startswith("# The paper's tables, made again\n\n```\n$ pxi-bench paper --data")
+    assert "| ProxyImg (paper) |  | 59955 | 36.99 |" in text
+    assert "pxi direct against SIREN, 3 layers, converged: " in text
+    assert "does not make yet: explicit representations" in text
+    page = (out / "report.html").read_text()
+    assert "<td>ProxyImg (paper)</td>" in page
+    assert "<code>codes at o = 8</code>" in page
+    assert (out / "implicit.svg").read_text().count("2-D Gaussians") == 2
+    assert (out / "implicit.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_resolution(tool, data, tmp_path, here, monkeypatch):
+    monkeypatch.setattr(resolution, "CODERS", {"direct": resolution.CODERS["direct"]})
+    out = tmp_path / "out"
+    tool("bench", "paper", "--data", data, "--out", out, "--quick", "--only", "resolution")
+    rows = rows_of(out, "resolution")
+    assert len(rows) == 2 * (2 + 3)
+    for factor in ("1/2", "1/4"):
+        plain = [r for r in rows if r["factor"] == factor and r["method"] == "no coder"]
+        coded = [r for r in rows if r["factor"] == factor and r["method"] == "pxi direct"]
+        assert {r["drawn"] for r in coded} == {"by itself", "bicubic", "Lanczos"}
+        assert all(0 < r["bytes"] < 5000 for r in coded)
+        assert max(r["psnr"] for r in coded) - min(r["psnr"] for r in coded) < 1.5
+        assert all(r["small_psnr"] > 20 and 0.2 < r["sharpness"] < 1 for r in coded)
+        assert all(r["small_psnr"] is None and r["psnr"] > 24 for r in plain)
+    assert "pxi direct, 1/2: drawing at the first size " in (out / "report.md").read_text()
+
+
+def test_sharpness():
+    picture = smooth(60, 50)
+    assert resolution.sharpness(picture, picture) == pytest.approx(1)
+    dull = (picture.astype(int) // 2 + 60).astype(np.uint8)
+    assert resolution.sharpness(picture, dull) == pytest.approx(0.5, abs=0.02)
+
+
+def made(data, out, measure, settings="s", names=("one", "two")):
+    pixels = smooth(5, 4)
+    found = [items.Item("implicit", "a", n, settings, pixels, partial(measure, n)) for n in names]
+    return run.Plan({"implicit": found})
+
+
+def test_resuming_measures_what_does_not_hold(data, tmp_path, here):
+    ran = []
+
+    def measure(name, pixels, earlier):
+        ran.append((name, sorted(earlier)))
+        return [{"method": name, "fit": "", "psnr": 20.0}]
+
+    plan = made(data, tmp_path, measure)
+    for _ in range(2):
+        run.measure(plan.groups(tmp_path), 1, lambda result: None)
+    assert ran == [("one", []), ("two", ["one"])]
+    assert store.load(tmp_path, plan.items["implicit"][1])[0]["picture"] == "a"
+
+    store.path_of(tmp_path, plan.items["implicit"][1]).write_text('{"key": ')
+    run.measure(plan.groups(tmp_path), 1, lambda result: None)
+    assert ran[2:] == [("two", ["one"])]
+
+    other = made(data, tmp_path, measure, "other settings")
+    run.measure(other.groups(tmp_path), 1, lambda result: None)
+    assert ran[3:] == [("one", []), ("two", ["one"])]
+    run.forget(tmp_path, other)
+    assert len(other.groups(tmp_path)) == 1
+
+
+def test_a_failure_leaves_the_rest(data, tmp_path, here):
+    def measure(name, pixels, earlier):
+        if name == "two":
+            raise InputError("bad luck")
+        return [{"method": name, "fit": "", "psnr": 20.0}]
+
+    plan = made(data, tmp_path, measure, names=("one", "two", "three"))
+    failed = []
+    run.measure(plan.groups(tmp_path), 1, failed.append)
+    assert [f.message for f in failed] == ["implicit, a, two: bad luck"]
+    run.write(tmp_path, plan, ["head"])
+    assert "| one |" in (tmp_path / "report.md").read_text()
+
+
+def test_results_are_kept(tool, data, tmp_path, here, monkeypatch):
+    def items_of(data, effort):
+        return [items.Item("implicit", "a", "one", "s", smooth(5, 4), lambda pixels, earlier: [
+            {"method": "pxi direct", "fit": "", "psnr": 31.25}])]  # fmt: skip
+
+    monkeypatch.setattr(implicit_section, "items", items_of)
+    words = ("bench", "paper", "--data", data, "--out", tmp_path / "out", "--only", "implicit")
+    tool(*words)
+    first = (tmp_path / "out/implicit.csv").read_text()
+    assert "31.25" in first
+    assert "--resume" in tool(*words, code=3).err
+    tool(*words, "--resume")
+    assert (tmp_path / "out/implicit.csv").read_text() == first
+    tool(*words, "--force", "--quiet")
+    tool(*words, "--force", "--resume", code=2)
+
+
+def test_what_is_wrong_is_said(tool, data, tmp_path):
+    words = ("bench", "paper", "--out", tmp_path / "out", "--data")
+    assert "implicit, resolution" in tool(*words, data, "--only", "animation", code=2).err
+    assert "kodak: is not a folder" in tool(*words, data / "kodak", code=3).err
+    assert "--jobs 0" in tool(*words, data, "-j", "0", code=2).err
+    tool("bench", "paper", "--out", data, "--data", data, code=2)
+    tool("bench", "paper", "--out", tmp_path / "x/y", "--data", data, code=3)
+    assert not (tmp_path / "out").exists()
+
+
+def test_sections_without_pictures_are_named(tmp_path):
+    rows = [{"picture": "a", "method": "pxi direct", "fit": "", "psnr": 30.0}]
+    absent = report.Part("resolution", "resolution freedom", resolution.TABLE, [], "no <kodak>")
+    parts = [report.Part("implicit", "implicit", implicit_section.TABLE, rows), absent]
+    assert "Not measured: no <kodak>" in report.markdown(parts, [])
+    assert "Not measured: no &lt;kodak&gt;" in report.page(parts, [])
+
+
+def test_tables_average_and_count():
+    table = Table(("method",), (Column("psnr", "PSNR", "{:.1f}"),), "psnr", (),
+                  ({"method": "paper", "psnr": 36.99},))  # fmt: skip
+    rows = [{"picture": p, "method": "ours", "psnr": v} for p, v in (("a", 30.0), ("b", 31.0))]
+    rows.append({"picture": "a", "method": "other", "psnr": None})
+    assert table.lines(rows) == [
+        ["method", "PSNR", "pictures"], ["ours", "30.5", "2"], ["other", "–", "1"],
+        ["paper", "37.0", "–"],
+    ]  # fmt: skip
+
+
+def test_leads_are_over_networks_of_the_same_size():
+    rows = [
+        {"picture": "a", "method": m, "fit": f, "psnr": v}
+        for m, f, v in (
+            ("pxi direct", "at most 50307", 33.0), ("pxi direct", "at most 83331", 35.0),
+            ("SIREN, 3 layers", "converged", 29.0), ("SIREN, 5 layers", "converged", 33.0),
+            ("hash grid", "converged", 33.5),
+        )
+    ]  # fmt: skip
+    assert implicit_section.conclusions(rows) == [
+        "pxi direct against SIREN, 3 layers, converged: +4.00 dB: at least 3 dB.",
+        "pxi direct against SIREN, 5 layers, converged: +2.00 dB: less than 3 dB.",
+        "pxi direct against hash grid, converged: -0.50 dB.",
+    ]
+
+
+@pytest.mark.parametrize("parameters", [7347, 50307, 83331])
+def test_direct_sampling_uses_the_parameters_it_may(parameters):
+    for height, width in ((512, 512), (100, 341)):
+        pixels = np.zeros((height, width, 3), np.uint8)
+
+        def count(grid, size=(width, height)):
+            spacing = max(size) / (grid - 1)
+            columns, rows = (max(round(n / spacing) + 1, 2) for n in size)
+            return columns * rows * SHAPE.dim + SHAPE.parameters
+
+        grid = grid_of(pixels, parameters)
+        assert count(grid) <= parameters < count(grid + 1)
+
+
+def test_help_names_all_sections(tool):
+    text = tool("bench", "paper", "--help").out.decode()
+    assert all(name in text for name in SECTIONS)
+    assert "not there yet: explicit" in text
