@@ -53,6 +53,17 @@ FULL = Effort()
 QUICK = Effort(pictures=2, side=256, width=64, effort=4)
 
 
+@lru_cache(maxsize=1)
+def code_version() -> str:
+    """Versions of the package and of torch, with hashes of the code that measures."""
+    here, hasher = Path(__file__).parent, hashlib.sha256()
+    for folder in (here, here.parent / "rivals"):
+        for path in sorted(folder.glob("*.py")):
+            if path.stem not in ("report", "charts"):
+                hasher.update(path.read_bytes())
+    return f"{pxi_version()}, torch {version('torch')}, {hasher.hexdigest()[:10]}"
+
+
 @dataclass(frozen=True)
 class Item:
     """One measurement.
@@ -73,21 +84,10 @@ class Item:
     settings: str
     pixels: Pixels
     measure: Callable[[Pixels, Earlier], list[Row]]
-    code: str = field(default_factory=lambda: code_version())
+    code: str = field(default_factory=code_version)
 
     @property
     def key(self) -> dict[str, str]:
         """Values that are the same for measurements of the same thing by the same code."""
         hasher = hashlib.sha256(repr(self.pixels.shape).encode() + self.pixels.tobytes())
         return {"digest": hasher.hexdigest()[:16], "settings": self.settings, "code": self.code}
-
-
-@lru_cache(maxsize=1)
-def code_version() -> str:
-    """Versions of the package and of torch, with hashes of the code that measures."""
-    here, hasher = Path(__file__).parent, hashlib.sha256()
-    for folder in (here, here.parent / "rivals"):
-        for path in sorted(folder.glob("*.py")):
-            if path.stem not in ("report", "charts"):
-                hasher.update(path.read_bytes())
-    return f"{pxi_version()}, torch {version('torch')}, {hasher.hexdigest()[:10]}"
