@@ -27,7 +27,9 @@ def add(tools: Any) -> None:
         allow_abbrev=False, help="the paper's tables, made again", description=PAPER,
         epilog=EXIT_CODES, formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
-    p.add_argument("--data", metavar="DIR", required=True, help="folder with kodak/")
+    p.add_argument(
+        "--data", metavar="DIR", required=True, help="folder with kodak/, emoji/ and clipart/"
+    )
     p.add_argument("-o", "--out", metavar="DIR", default="paper", help="where the results go; "
                    "default paper")  # fmt: skip
     p.add_argument("--only", metavar="A,B", help="only these sections")

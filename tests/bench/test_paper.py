@@ -7,14 +7,24 @@ import numpy as np
 import pytest
 
 from proxyimg_codec.bench import workers
-from proxyimg_codec.bench.paper import SECTIONS, items, report, resolution, run, store
+from proxyimg_codec.bench.paper import (
+    SECTIONS,
+    explicit,
+    items,
+    pictures,
+    report,
+    resolution,
+    run,
+    store,
+)
 from proxyimg_codec.bench.paper import implicit as implicit_section
-from proxyimg_codec.bench.paper.ours import SHAPE, grid_of
+from proxyimg_codec.bench.paper.ours import SHAPE, grid_of, of_size
 from proxyimg_codec.bench.paper.tables import Column, Table
+from proxyimg_codec.bench.peers import codecs
 from proxyimg_codec.bench.rivals import sines
 from proxyimg_codec.errors import InputError
 from proxyimg_codec.io import raster
-from tests.support.pictures import smooth
+from tests.support.pictures import disc, smooth
 
 TINY = items.Effort(1, 37, 48, 30, 5, 2, 4, 1)
 
@@ -58,7 +68,7 @@ def test_a_run_from_pictures_to_a_report(tool, data, tmp_path, here):
     assert text.startswith("# The paper's tables, made again\n\n```\n$ pxi-bench paper --data")
     assert "| ProxyImg (paper) |  | 59955 | 36.99 |" in text
     assert "pxi direct against SIREN, 3 layers, converged: " in text
-    assert "does not make yet: explicit representations" in text
+    assert "does not make yet: Bézier renderers" in text
     page = (out / "report.html").read_text()
     assert "<td>ProxyImg (paper)</td>" in page
     assert "<code>codes at o = 8</code>" in page
@@ -81,6 +91,55 @@ def test_resolution(tool, data, tmp_path, here, monkeypatch):
         assert all(r["small_psnr"] > 20 and 0.2 < r["sharpness"] < 1 for r in coded)
         assert all(r["small_psnr"] is None and r["psnr"] > 24 for r in plain)
     assert "pxi direct, 1/2: drawing at the first size " in (out / "report.md").read_text()
+
+
+def test_explicit(tool, data, tmp_path, here):
+    (data / "emoji").mkdir()
+    face = np.dstack([smooth(41, 43), 255 * disc(41, 43).astype(np.uint8)])
+    raster.write(data / "emoji" / "face.png", face)
+    out = tmp_path / "out"
+    tool("bench", "paper", "--data", data, "--out", out, "--quick", "--only", "explicit")
+    rows = [r for r in rows_of(out, "explicit") if r["folder"] == "emoji"]
+    gaussians, *files = sorted(rows, key=lambda r: r["method"])
+    assert gaussians["parameters"] == 280
+    assert {r["method"] for r in files} == {"WebP", "pxi pyramid", "pxi pyramid, found layers"}
+    for row in rows:
+        assert row["psnr"] == pytest.approx(-10 * np.log10(row["mse"] / 1000), abs=0.01)
+        assert row["psnr"] > (20 if row in files else 3)
+    assert all(row["bytes"] < 1300 for row in files)
+    assert "| icons | ProxyImg (paper) | 0.110 |" in (out / "report.md").read_text()
+
+
+def test_pictures_are_drawn_over_white(tmp_path):
+    clear = np.zeros((9, 7, 4), np.uint8)
+    clear[2, 3] = (200, 100, 0, 51)
+    raster.write(tmp_path / "a.png", clear)
+    ((name, pixels),) = pictures.over_white(tmp_path, 5, 8)
+    assert (name, pixels.shape) == ("a", (8, 7, 3))
+    assert pixels[2, 3].tolist() == [244, 224, 204]
+    assert (np.delete(pixels.reshape(-1, 3), 2 * 7 + 3, 0) == 255).all()
+
+
+def test_pictures_are_chosen_evenly(tmp_path):
+    for k in range(7):
+        raster.write(tmp_path / f"{k}.png", smooth(12, 12))
+    assert [n for n, _ in pictures.crops(tmp_path, 3, 12)] == ["0", "2", "4"]
+    assert len(pictures.crops(tmp_path, 24, 12)) == 7
+
+
+def test_files_are_as_large_as_they_may_be():
+    webp, picture = codecs()["webp"], smooth(64, 48)
+    sizes = [len(webp.encode(picture, q)) for q in range(101)]
+    size = sizes[60]
+    assert sizes[-1] > len(explicit.largest(webp, picture, size)) > 0.9 * size
+    assert len(explicit.largest(webp, picture, size)) <= size
+    assert explicit.largest(webp, picture, 1) == webp.encode(picture, 0)
+
+
+def test_sizes_out_of_reach_are_the_nearest():
+    picture = smooth(29, 23)
+    most, least = (len(of_size(picture, n, effort=1).to_bytes()) for n in (10**6, 20))
+    assert 20 < least < most < 10**6
 
 
 def test_sharpness():
@@ -153,8 +212,11 @@ def test_results_are_kept(tool, data, tmp_path, here, monkeypatch):
 
 def test_what_is_wrong_is_said(tool, data, tmp_path):
     words = ("bench", "paper", "--out", tmp_path / "out", "--data")
-    assert "implicit, resolution" in tool(*words, data, "--only", "animation", code=2).err
-    assert "kodak: is not a folder" in tool(*words, data / "kodak", code=3).err
+    assert "explicit, implicit, resolution" in tool(*words, data, "--only", "animation", code=2).err
+    message = tool(*words, data / "kodak", code=3).err
+    assert "holds none of the folders emoji" in message
+    message = tool(*words, data / "kodak", "--only", "resolution", code=3).err
+    assert "kodak: is not a folder" in message
     assert "--jobs 0" in tool(*words, data, "-j", "0", code=2).err
     tool("bench", "paper", "--out", data, "--data", data, code=2)
     tool("bench", "paper", "--out", tmp_path / "x/y", "--data", data, code=3)
@@ -213,4 +275,4 @@ def test_direct_sampling_uses_the_parameters_it_may(parameters):
 def test_help_names_all_sections(tool):
     text = tool("bench", "paper", "--help").out.decode()
     assert all(name in text for name in SECTIONS)
-    assert "not there yet: explicit" in text
+    assert "not there yet: Bézier" in text

@@ -5,13 +5,14 @@ item yields rows and is kept as a JSON file, so that an interrupted run goes on.
 """
 
 SECTIONS = {
+    "explicit": "explicit representations at ten shapes' worth of parameters",
     "implicit": "implicit representations at equal parameters",
     "resolution": "resolution freedom",
 }
 """Titles of the sections that exist, by name, in the order of the report."""
 
 MISSING = (
-    "explicit representations", "compression", "ablations and sweeps",
+    "Bézier renderers and tracers", "compression", "ablations and sweeps",
     "geometry and texture editing", "animation",
 )  # fmt: skip
 """Parts of the paper that have no section yet; reports name them."""

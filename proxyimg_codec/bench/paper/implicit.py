@@ -7,9 +7,8 @@ import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from ...errors import UsageError
 from .items import Earlier, Effort, Item, Pixels, Row
 from .pictures import crops
 from .tables import Column, Table
@@ -79,7 +78,7 @@ TABLE = Table(
         "At SIREN's width of 128 the numbers of parameters are the paper's, 50,307 and 83,331. "
         "Smaller crops get narrower layers in proportion, so that parameters per pixel stay.",
         "Parameters are 32-bit numbers that are fitted; nothing is quantized but the pyramid, "
-        "whose file has at most one byte for each parameter of SIREN.",
+        "whose file has about one byte for each parameter of SIREN.",
         "Rivals are fitted by Adam on random pixels with cosine decay, twice: *converged* doubles "
         "the steps until that gains less than 0.1 dB or a bound is reached (the last column says "
         "for how many pictures it converged), *equal time* gets as many CPU seconds as direct "
@@ -155,19 +154,15 @@ def _node(pixels: Pixels, earlier: Earlier, *, steps: int) -> list[Row]:
 
 
 def _pyramid(pixels: Pixels, earlier: Earlier, *, size: int, effort: int) -> list[Row]:
-    from ...api import encode
     from ..measure import ms_ssim, psnr
+    from .ours import of_size
 
     started = time.process_time()
-    rest: dict[str, Any] = {"max_layers": 1, "effort": effort, "jobs": 1}
-    try:
-        image = encode(pixels, target_size=size, **rest)
-    except UsageError:  # so simple a picture is smaller at any quality
-        image = encode(pixels, quality=100, **rest)
+    image = of_size(pixels, size, max_layers=1, effort=effort)
     seconds = time.process_time() - started
     shown = image.render()
     return [{
-        "method": "pxi pyramid", "fit": f"at most {size} bytes", "bytes": len(image.to_bytes()),
+        "method": "pxi pyramid", "fit": f"about {size} bytes", "bytes": len(image.to_bytes()),
         "psnr": round(psnr(pixels, shown), 4), "ms_ssim": round(ms_ssim(pixels, shown), 6),
         "seconds": round(seconds, 2),
     }]  # fmt: skip

@@ -6,10 +6,12 @@ import math
 import time
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import cv2
 import numpy as np
 
+from ...api import Image, encode
 from ...encoder.implicit import fit, fit_node, node_problem
 from ...encoder.implicit.fit_problem import Problem, build
 from ...encoder.implicit.node_problem import NodeOptions, NodeProblem
@@ -17,6 +19,7 @@ from ...encoder.implicit.state import State, rows_of
 from ...encoder.settings import PRESETS, Settings
 from ...encoder.shapes.layers import Plan, plan_layers
 from ...encoder.shapes.meshes import with_meshes
+from ...errors import UsageError
 from ...io.samples import to_float
 from ...texture.network import Floats, NetShape, encode_features
 from ..measure import ms_ssim, psnr
@@ -83,6 +86,18 @@ def evaluate(problem: Problem, state: State) -> Floats:
                 x = np.maximum(x, 0)
         out.append(x)
     return np.concatenate(out)
+
+
+def of_size(pixels: Pixels, size: int, **settings: Any) -> Image:
+    """Encodes a pyramid of about `size` bytes, or as near as the qualities go."""
+    settings["jobs"] = 1
+    try:
+        return encode(pixels, target_size=size, **settings)
+    except UsageError:  # out of reach; the flag says no side of it
+        smallest = encode(pixels, quality=0, **settings)
+        if len(smallest.to_bytes()) >= size:
+            return smallest
+        return encode(pixels, quality=100, **settings)
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +57,7 @@ class Fitted:
         parameters: Number of parameters.
         steps: Number of optimizer steps.
         seconds: CPU seconds of the fit.
+        shown: uint8 [H, W, 3] what it learned; None if it is only measured.
         converged: Whether half as many steps are worse by less than `GAIN`; None if unknown.
     """
 
@@ -65,6 +66,7 @@ class Fitted:
     parameters: int
     steps: int
     seconds: float
+    shown: Pixels | None = None
     converged: bool | None = None
 
 
@@ -98,7 +100,8 @@ def fit(make: Maker, pixels: Pixels, steps: int, seed: int = 0) -> Fitted:
         seconds = time.process_time() - started
     shown = picture(rival, *pixels.shape[:2])
     count = rival.parameters_used
-    return Fitted(psnr(pixels, shown), ms_ssim(pixels, shown), count, steps, seconds)
+    quality = psnr(pixels, shown), ms_ssim(pixels, shown)
+    return Fitted(*quality, count, steps, seconds, shown)
 
 
 def fit_converged(make: Maker, pixels: Pixels, first: int, most: int) -> Fitted:
@@ -115,8 +118,7 @@ def fit_converged(make: Maker, pixels: Pixels, first: int, most: int) -> Fitted:
         more = fit(make, pixels, 2 * found.steps)
         gain = more.psnr - found.psnr
         found = more if gain > 0 else found
-    return Fitted(found.psnr, found.ms_ssim, found.parameters, found.steps, found.seconds,
-                  gain < GAIN)  # fmt: skip
+    return replace(found, converged=gain < GAIN)
 
 
 def fit_for(make: Maker, pixels: Pixels, seconds: float, probe: int = 20) -> Fitted:
