@@ -1,4 +1,4 @@
-"""Bars of the means of a section, with a dot for each picture."""
+"""Plots of sections: the mean of each line of a table, and its pictures as dots."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .tables import Table, mean
 OURS = "#d62728"
 
 
-def bars(table: Table, rows: Sequence[Row], title: str, kind: str) -> bytes:
+def plot(table: Table, rows: Sequence[Row], title: str, kind: str) -> bytes:
     """Draws the charted column of a table.
 
     Args:
@@ -33,19 +33,18 @@ def bars(table: Table, rows: Sequence[Row], title: str, kind: str) -> bytes:
         figure = Figure(figsize=(8.6, 1.2 + 0.26 * len(groups)), dpi=160, layout="constrained")
         axes = figure.add_subplot()
         for k, (names, group) in enumerate(groups):
-            ours = any(n.startswith("pxi") for n in names)
-            value = mean(group, column.key) or 0.0
-            axes.barh(k, value, color=OURS if ours else OTHER, alpha=0.75, height=0.72)
+            colour = OURS if any(n.startswith("pxi") for n in names) else OTHER
             dots = [r[column.key] for r in group if r.get(column.key) is not None]
-            axes.plot(dots, [k] * len(dots), "o", color="black", markersize=2.2)
-            axes.annotate(column.form.format(value), (max(value, *dots), k), (4, 0), va="center",
-                          textcoords="offset points", fontsize=8)  # fmt: skip
-        values = [r[column.key] for _, g in groups for r in g if r.get(column.key) is not None]
-        least, most = min(values), max(values)
-        axes.set_xlim(max(least - 0.25 * (most - least) - 1e-9, 0), most + 0.12 * (most - least))
+            value = mean(group, column.key) or 0.0
+            axes.plot(dots, [k] * len(dots), "o", color=colour, alpha=0.45, markersize=2.6)
+            axes.plot(value, k, "D", color=colour, markersize=5.5)
+            axes.annotate(column.form.format(value), (1.01, k), xycoords=("axes fraction", "data"),
+                          va="center", color=colour, annotation_clip=False)  # fmt: skip
         axes.set_yticks(range(len(groups)), [", ".join(filter(None, n)) for n, _ in groups])
         axes.invert_yaxis()
-        axes.set_xlabel(f"{column.head}, mean; a dot is a picture")
+        axes.set_xlabel(f"{column.head}: the mean, and each picture as a dot")
+        axes.grid(color="#e6e6e6", linewidth=0.6)
+        axes.set_axisbelow(True)
         axes.set_title(title, loc="left", fontsize=10.5)
         axes.spines[["top", "right"]].set_visible(False)
         out = io.BytesIO()

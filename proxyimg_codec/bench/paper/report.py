@@ -16,7 +16,7 @@ from ..._version import __version__
 from ...io.files import write_atomically
 from ..rd import machine
 from . import MISSING
-from .charts import bars
+from .charts import plot
 from .items import Row
 from .tables import Table
 
@@ -68,7 +68,7 @@ def write(out: Path, parts: Sequence[Part], head: Sequence[str]) -> None:
         if part.rows:
             write_atomically(out / f"{part.name}.csv", to_csv(part.rows).encode())
             for kind in ("svg", "png"):
-                drawn = bars(part.table, part.rows, part.title, kind)
+                drawn = plot(part.table, part.rows, _capital(part.title), kind)
                 write_atomically(out / f"{part.name}.{kind}", drawn)
     write_atomically(out / "report.md", markdown(parts, head).encode())
     write_atomically(out / "report.html", page(parts, head).encode())
