@@ -5,11 +5,14 @@ from __future__ import annotations
 import argparse
 import os
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..bench.paper import MISSING, SECTIONS
 from ..errors import InputError, UsageError
 from .common import EXIT_CODES, Bar
+
+if TYPE_CHECKING:
+    from ..bench.rd import Failure
 
 PAPER = f"""The paper's tables on open pictures, with its figures beside ours and rivals that are
 fitted in the same run. DIR receives report.md and report.html, a CSV file and plots of each
@@ -76,22 +79,25 @@ def work(args: argparse.Namespace, command: str) -> None:
     say("\n".join(head))
     for name, why in plan.absent.items():
         say(f"{name} is left out: {why}")
-    failures = []
     bar = Bar(len(groups), "measuring", args.quiet)
+    done: list[Failure | None] = []
 
-    def finished(result: Any) -> None:
-        if result is not None:
-            failures.append(result.message)
+    def finished(result: Failure | None) -> None:
+        done.append(result)
         bar.advance(1)
 
     try:
         run.measure(groups, jobs, finished)
     finally:
         bar.close()
+        if len(done) < len(groups):
+            say(f"what was measured is in {out / 'items'}; --resume goes on from there")
     run.write(out, plan, head)
     say(f"{out / 'report.md'}, {out / 'report.html'}")
+    failures = [result.message for result in done if result is not None]
     if failures:
-        raise InputError(f"{len(failures)} pictures failed, the first: {failures[0]}")
+        raise InputError(f"{len(failures)} of {len(groups)} pictures failed, the first: "
+                         f"{failures[0]}")  # fmt: skip
 
 
 def check_out(out: Path, args: argparse.Namespace) -> None:

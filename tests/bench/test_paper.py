@@ -71,7 +71,8 @@ def test_a_run_from_pictures_to_a_report(tool, data, tmp_path, here):
     assert "does not make yet: Bézier renderers" in text
     page = (out / "report.html").read_text()
     assert "<td>ProxyImg (paper)</td>" in page
-    assert "<code>codes at o = 8</code>" in page
+    assert "<em>equal time</em>" in page
+    assert "spacing o = 8 there are " in text
     assert (out / "implicit.svg").read_text().count("2-D Gaussians") == 2
     assert (out / "implicit.png").read_bytes()[:4] == b"\x89PNG"
 
@@ -208,6 +209,23 @@ def test_results_are_kept(tool, data, tmp_path, here, monkeypatch):
     assert (tmp_path / "out/implicit.csv").read_text() == first
     tool(*words, "--force", "--quiet")
     tool(*words, "--force", "--resume", code=2)
+
+
+def test_failures_and_interruptions_are_told(tool, data, tmp_path, here, monkeypatch):
+    def items_of(data, effort):
+        return [items.Item("implicit", name, "one", "s", smooth(5, 4), fail) for name in "ab"]
+
+    def fail(pixels, earlier):
+        raise error("bad luck")
+
+    monkeypatch.setattr(implicit_section, "items", items_of)
+    words = ("bench", "paper", "--data", data, "--out", tmp_path / "out", "--only", "implicit")
+    error = InputError
+    message = tool(*words, code=3).err
+    assert "2 of 2 pictures failed, the first: implicit, a, one: bad luck" in message
+    assert "every measurement failed" in (tmp_path / "out/report.md").read_text()
+    error = KeyboardInterrupt
+    assert b"--resume goes on from there" in tool(*words, "--force", code=130).out
 
 
 def test_what_is_wrong_is_said(tool, data, tmp_path):
