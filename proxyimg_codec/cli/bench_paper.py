@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 from ..bench.paper import MISSING, SECTIONS
@@ -20,7 +21,7 @@ section, and the measurements as JSON files in items/.
 
 sections:
 {chr(10).join(f"  {name:12}{title}" for name, title in SECTIONS.items())}
-not there yet: {", ".join(MISSING)}"""
+{fill("not there yet: " + ", ".join(MISSING), 90)}"""
 
 
 def add(tools: Any) -> None:

@@ -59,7 +59,7 @@ def test_a_run_from_pictures_to_a_report(tool, data, tmp_path, here):
     named = {(r["method"], r["fit"]) for r in rows}
     rivals = ("SIREN, 3 layers", "COIN", "hash grid", "2-D Gaussians", "LIIF-like grid")
     for rival in ("SIREN, 5 layers", *rivals):
-        assert {(rival, "converged"), (rival, "equal time")} <= named
+        assert {(rival, "long"), (rival, "equal time")} <= named
     assert {m for m, _ in named} >= {"pxi direct", "pxi node", "pxi pyramid"}
     assert {r["picture"] for r in rows} == {"a"}
     counts = [r["parameters"] for r in rows if r["method"] in rivals]
@@ -67,7 +67,7 @@ def test_a_run_from_pictures_to_a_report(tool, data, tmp_path, here):
     text = (out / "report.md").read_text()
     assert text.startswith("# The paper's tables, made again\n\n```\n$ pxi-bench paper --data")
     assert "| ProxyImg (paper) |  | 59955 | 36.99 |" in text
-    assert "pxi direct against SIREN, 3 layers, converged: " in text
+    assert "pxi direct against SIREN, 3 layers, long: " in text
     assert "does not make yet: Bézier renderers" in text
     page = (out / "report.html").read_text()
     assert "<td>ProxyImg (paper)</td>" in page
@@ -265,14 +265,14 @@ def test_leads_are_over_networks_of_the_same_size():
         {"picture": "a", "method": m, "fit": f, "psnr": v}
         for m, f, v in (
             ("pxi direct", "at most 50307", 33.0), ("pxi direct", "at most 83331", 35.0),
-            ("SIREN, 3 layers", "converged", 29.0), ("SIREN, 5 layers", "converged", 33.0),
-            ("hash grid", "converged", 33.5),
+            ("SIREN, 3 layers", "long", 29.0), ("SIREN, 5 layers", "long", 33.0),
+            ("hash grid", "long", 33.5),
         )
     ]  # fmt: skip
     assert implicit_section.conclusions(rows) == [
-        "pxi direct against SIREN, 3 layers, converged: +4.00 dB: at least 3 dB.",
-        "pxi direct against SIREN, 5 layers, converged: +2.00 dB: less than 3 dB.",
-        "pxi direct against hash grid, converged: -0.50 dB.",
+        "pxi direct against SIREN, 3 layers, long: +4.00 dB: at least 3 dB.",
+        "pxi direct against SIREN, 5 layers, long: +2.00 dB: less than 3 dB.",
+        "pxi direct against hash grid, long: -0.50 dB.",
     ]
 
 

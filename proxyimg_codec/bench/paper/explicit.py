@@ -50,9 +50,9 @@ TABLE = Table(
         "The paper's pictures are others, and its icons are not cliparts; it gives the MSE of "
         "colours in 0..1, as here.",
         "Pictures with transparency are drawn over white. Larger ones are central crops.",
-        "Gaussians are fitted until they converge (see the other section), as many as fit the "
-        "parameters. Files are whole files of about the same bytes; a file that is larger could "
-        "not be smaller.",
+        "There are as many Gaussians as fit the parameters, fitted with twice the steps until that "
+        "gains less than 0.1 dB or a bound is reached. Files are whole files of about the same "
+        "bytes; one that is much larger could not be smaller.",
         "LPIPS is not measured: its backbones are not to be had here. Differentiable Bézier "
         "renderers (DiffVG, LIVE) and tracers are still missing.",
     ),

@@ -83,7 +83,7 @@ TABLE = Table(
         "Smaller crops get narrower layers in proportion, so that parameters per pixel stay.",
         "Parameters are 32-bit numbers that are fitted; nothing is quantized but the pyramid, "
         "whose file has about one byte for each parameter of SIREN.",
-        "Rivals are fitted by Adam on random pixels with cosine decay, twice: *converged* doubles "
+        "Rivals are fitted by Adam on random pixels with cosine decay, twice: *long* doubles "
         "the steps until that gains less than 0.1 dB or a bound is reached (the last column says "
         "for how many pictures it converged), *equal time* gets as many CPU seconds as direct "
         "sampling took. Steps at equal time are measured, so they differ from run to run; with the "
@@ -209,4 +209,4 @@ def _rival(
     if ours:
         seconds = float(earlier[ours][0]["seconds"])
         return [row_of(label, "equal time", fitting.fit_for(make, pixels, seconds))]
-    return [row_of(label, "converged", fitting.fit_converged(make, pixels, first, most))]
+    return [row_of(label, "long", fitting.fit_converged(make, pixels, first, most))]
