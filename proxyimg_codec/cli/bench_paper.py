@@ -75,7 +75,11 @@ def work(args: argparse.Namespace, command: str) -> None:
     if not args.resume:
         run.forget(out, plan)
     groups = plan.groups(out)
-    say = (lambda text: None) if args.quiet else print
+
+    def say(text: str) -> None:
+        if not args.quiet:
+            print(text, flush=True)  # what waits in a buffer is dropped when a run is interrupted
+
     head = report.header(command)
     say("\n".join(head))
     for name, why in plan.absent.items():

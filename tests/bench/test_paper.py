@@ -68,7 +68,7 @@ def test_a_run_from_pictures_to_a_report(tool, data, tmp_path, here):
     assert text.startswith("# The paper's tables, made again\n\n```\n$ pxi-bench paper --data")
     assert "| ProxyImg (paper) |  | 59955 | 36.99 |" in text
     assert "pxi direct against SIREN, 3 layers, long: " in text
-    assert "does not make yet: Bézier renderers" in text
+    assert "does not make yet: differentiable renderers" in text
     page = (out / "report.html").read_text()
     assert "<td>ProxyImg (paper)</td>" in page
     assert "<em>equal time</em>" in page
@@ -293,4 +293,4 @@ def test_direct_sampling_uses_the_parameters_it_may(parameters):
 def test_help_names_all_sections(tool):
     text = tool("bench", "paper", "--help").out.decode()
     assert all(name in text for name in SECTIONS)
-    assert "not there yet: Bézier" in text
+    assert "not there yet: differentiable" in text

@@ -12,7 +12,7 @@ SECTIONS = {
 """Titles of the sections that exist, by name, in the order of the report."""
 
 MISSING = (
-    "Bézier renderers and tracers", "compression", "ablations and sweeps",
+    "differentiable renderers (DiffVG, LIVE) and tracers", "compression", "ablations and sweeps",
     "geometry and texture editing", "animation",
 )  # fmt: skip
 """Parts of the paper that have no section yet; reports name them."""

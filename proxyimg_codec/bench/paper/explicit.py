@@ -47,8 +47,8 @@ TABLE = Table(
         f"Ten shapes are counted as LIVE does: {SHAPE_PARAMETERS} numbers each (12 points of a "
         f"closed path of four cubic segments, red, green, blue and opacity), {PARAMETERS} in all, "
         f"or {BYTES} bytes of 32-bit numbers. How the paper counts is not known here.",
-        "The paper's pictures are others, and its icons are not cliparts; it gives the MSE of "
-        "colours in 0..1, as here.",
+        "The paper's pictures are others, and its icons are not cliparts; its MSE is taken to be "
+        "of colours in 0..1, as here.",
         "Pictures with transparency are drawn over white. Larger ones are central crops.",
         "There are as many Gaussians as fit the parameters, fitted with twice the steps until that "
         "gains less than 0.1 dB or a bound is reached. Files are whole files of about the same "
