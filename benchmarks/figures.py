@@ -8,71 +8,25 @@ DATA is a folder with kodak/ (24 PNG), kodak_masks/ (label PNGs), photo/ and pho
 from __future__ import annotations
 
 import argparse
-import time
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.common import Pixels, centre_crop, header, kodak, read_rgb, run_limited
+from benchmarks.common import centre_crop, header, kodak, read_rgb, run_limited
 from proxyimg_codec import encode
+from proxyimg_codec.bench.paper import ours
 from proxyimg_codec.encoder.implicit import fit
 from proxyimg_codec.encoder.implicit.fit_problem import build
-from proxyimg_codec.encoder.implicit.state import State, rows_of
 from proxyimg_codec.encoder.settings import Settings
 from proxyimg_codec.encoder.shapes.mask_files import load_masks
 from proxyimg_codec.io.psnr import psnr_8bit
 from proxyimg_codec.io.samples import to_float
-from proxyimg_codec.texture.network import NetShape, encode_features
 
-FLOAT_SHAPE = NetShape(8, 6, 32, 2, 3)
 FLOAT_GRID = 83
 FLOAT_STEPS = 16000
 ENLARGED_STEPS = 24000
 TARGETS = {"kodim23": 35.5, "kodim15": 33.5, "kodim05": 28.3}
-
-
-def fit_float(pixels: Pixels, steps: int) -> tuple[float, int, float]:
-    """Fits one layer in floating point, without quantization.
-
-    Args:
-        pixels: uint8 [S, S, 3] picture.
-        steps: Number of optimizer steps.
-
-    Returns:
-        PSNR in dB of the picture rounded to 8 bits, number of parameters, and CPU seconds.
-    """
-    size = pixels.shape[0]
-    problem = build(to_float(pixels)[0], [None], FLOAT_SHAPE, size / (FLOAT_GRID - 1))
-    started = time.process_time()
-    trainer = fit.make_trainer(problem, "cpu", 1)
-    state = fit.fit_float(problem, trainer, steps, 0)
-    cpu = time.process_time() - started
-    out = evaluate(problem, state).reshape(pixels.shape)
-    value = psnr_8bit(pixels, np.rint(np.clip(out, 0, 1) * 255).astype(np.uint8))
-    return value or 99.0, state.codes.size + state.weights.size, cpu
-
-
-def evaluate(problem: object, state: State) -> Pixels:
-    """Computes the unquantized output float32 [pixels, 3] of a problem with one layer in numpy."""
-    from proxyimg_codec.encoder.implicit.fit_problem import Problem
-
-    assert isinstance(problem, Problem)
-    out = []
-    for i in range(0, problem.pixels, 1 << 15):
-        at = slice(i, i + (1 << 15))
-        base, stride = problem.base[at], problem.stride[at]
-        fx, fy = problem.fx[at, None], problem.fy[at, None]
-        top = state.codes[base] * (1 - fx) + state.codes[base + 1] * fx
-        below = state.codes[base + stride] * (1 - fx) + state.codes[base + stride + 1] * fx
-        x = encode_features(top * (1 - fy) + below * fy, problem.shape.octaves)
-        rows = rows_of(problem.shape, state.weights)
-        for k, (weight, bias) in enumerate(rows):
-            x = x @ weight.T + bias
-            if k + 1 < len(rows):
-                x = np.maximum(x, 0)
-        out.append(x)
-    return np.concatenate(out)
 
 
 def float_figures(data: Path, quick: bool) -> None:
@@ -82,10 +36,11 @@ def float_figures(data: Path, quick: bool) -> None:
     for path in kodak(data):
         if quick and path.stem not in TARGETS:
             continue
-        value, parameters, cpu = fit_float(centre_crop(read_rgb(path)), FLOAT_STEPS)
-        values.append(value)
+        found = ours.direct(centre_crop(read_rgb(path)), FLOAT_GRID, FLOAT_STEPS)
+        values.append(found.psnr)
         target = f" (target {TARGETS[path.stem]})" if path.stem in TARGETS else ""
-        print(f"  {path.stem} {value:.2f} dB, {parameters} parameters, {cpu:.1f} CPU-s{target}")
+        print(f"  {path.stem} {found.psnr:.2f} dB, {found.parameters} parameters, "
+              f"{found.seconds:.1f} CPU-s{target}")  # fmt: skip
     print(f"  mean of {len(values)}: {np.mean(values):.2f} dB (target 31.5 over 24)")
     import cv2
 
@@ -95,9 +50,10 @@ def float_figures(data: Path, quick: bool) -> None:
         crop = centre_crop(pixels, min(512, *pixels.shape[:2]))
         photo = cv2.resize(crop, (256, 256), interpolation=cv2.INTER_AREA)
         enlarged = cv2.resize(photo, (512, 512), interpolation=cv2.INTER_CUBIC)
-        value, parameters, cpu = fit_float(enlarged, ENLARGED_STEPS)
-        values.append(value)
-        print(f"  {path.stem}, 256 px enlarged to 512: {value:.2f} dB, {cpu:.1f} CPU-s")
+        found = ours.direct(np.asarray(enlarged, np.uint8), FLOAT_GRID, ENLARGED_STEPS)
+        values.append(found.psnr)
+        print(f"  {path.stem}, 256 px enlarged to 512: {found.psnr:.2f} dB, "
+              f"{found.seconds:.1f} CPU-s")  # fmt: skip
     print(f"  mean of {len(values)} enlarged photos: {np.mean(values):.2f} dB (target 39)")
 
 
@@ -114,7 +70,7 @@ def quantized_figures(data: Path, quick: bool) -> None:
         problem = build(to_float(crop)[0], [None], shape, settings.spacing)
         half = settings.steps // 2
         state = fit.fit_float(problem, fit.make_trainer(problem, "cpu", 2), half, 0)
-        out = evaluate(problem, state).reshape(crop.shape)
+        out = ours.evaluate(problem, state).reshape(crop.shape)
         before = psnr_8bit(crop, np.rint(np.clip(out, 0, 1) * 255).astype(np.uint8)) or 99.0
         image = encode(crop, settings)  # begins with the same float fit
         after = psnr_8bit(crop, image.render()) or 99.0

@@ -30,9 +30,26 @@ WINDOW = 11
 
 def psnr(a: Pixels, b: Pixels) -> float:
     """PSNR in dB of two pictures of the same size over all RGB samples, at most `PSNR_CAP`."""
-    errors = [float(((x - y) ** 2).mean()) for x, y in _seen(a, b)]
-    error = sum(errors) / len(errors)
+    error = mean_square(a, b)
     return min(PSNR_CAP, 10 * math.log10(255**2 / error)) if error else PSNR_CAP
+
+
+def mean_square(a: Pixels, b: Pixels) -> float:
+    """Mean squared error of two pictures of the same size over all RGB samples of 0..255."""
+    errors = [float(((x - y) ** 2).mean()) for x, y in _seen(a, b)]
+    return sum(errors) / len(errors)
+
+
+def ssim(a: Pixels, b: Pixels) -> float:
+    """SSIM of two pictures of the same size (Wang et al. 2004), the mean of the RGB channels.
+
+    Returns:
+        The index, at most 1; NaN if the picture is smaller than the window.
+    """
+    if min(a.shape[:2]) < WINDOW:
+        return math.nan
+    values = [float(np.prod(_ssim(x, y), 0).mean()) for x, y in _seen(a, b)]
+    return sum(values) / len(values)
 
 
 def ms_ssim(a: Pixels, b: Pixels) -> float:

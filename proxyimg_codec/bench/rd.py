@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-import multiprocessing
 import os
 import platform
 import time
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from pathlib import Path
@@ -17,8 +14,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, LimitError, PxiError, UsageError
+from ..errors import InputError, PxiError, UsageError
 from ..io import raster
+from . import workers
 from .peers import Codec
 from .rows import Row
 
@@ -26,10 +24,6 @@ Pixels = NDArray[np.uint8]
 
 SUFFIXES = (".png", ".webp", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".ppm", ".jp2", ".npy")
 """Suffixes of the files of a folder that are read as pictures."""
-
-ONE_THREAD = dict.fromkeys(
-    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS"), "1"
-)
 
 
 @dataclass(frozen=True)
@@ -85,17 +79,10 @@ def find(folder: Path, chosen: str | None = None, masks: Path | None = None) -> 
             is damaged.
         UsageError: A chosen picture does not exist.
     """
-    for place in (folder, masks):
-        if place is not None and not place.is_dir():
-            raise InputError(f"{place}: is not a folder")
-    seen = (p for p in folder.iterdir() if not p.name.startswith("."))
-    files = sorted(p for p in seen if p.suffix.lower() in SUFFIXES and p.is_file())
-    if not files:
-        raise InputError(f"{folder}: holds no pictures ({', '.join(SUFFIXES)})")
+    files = files_of(folder)
+    if masks is not None and not masks.is_dir():
+        raise InputError(f"{masks}: is not a folder")
     names = [p.stem for p in files]
-    if len(set(names)) < len(names):
-        twin = next(n for n in names if names.count(n) > 1)
-        raise InputError(f"{folder}: two pictures are called {twin}; rename one")
     if chosen is not None and chosen.isdecimal():
         if int(chosen) == 0:
             raise UsageError("--images 0: at least one picture is needed")
@@ -107,6 +94,25 @@ def find(folder: Path, chosen: str | None = None, masks: Path | None = None) -> 
             raise UsageError(f"--images: {folder} has no picture {unknown[0]!r}")
         files = [p for p in files if p.stem in wanted]
     return [_source(path, masks) for path in files]
+
+
+def files_of(folder: Path) -> list[Path]:
+    """Picture files of a folder, sorted by name; folders inside it are not searched.
+
+    Raises:
+        InputError: The folder does not exist, has no pictures or two of the same name.
+    """
+    if not folder.is_dir():
+        raise InputError(f"{folder}: is not a folder")
+    seen = (p for p in folder.iterdir() if not p.name.startswith("."))
+    files = sorted(p for p in seen if p.suffix.lower() in SUFFIXES and p.is_file())
+    if not files:
+        raise InputError(f"{folder}: holds no pictures ({', '.join(SUFFIXES)})")
+    names = [p.stem for p in files]
+    if len(set(names)) < len(names):
+        twin = next(n for n in names if names.count(n) > 1)
+        raise InputError(f"{folder}: two pictures are called {twin}; rename one")
+    return files
 
 
 def _source(path: Path, masks: Path | None) -> Source:
@@ -147,47 +153,8 @@ def plan(sources: Sequence[Source], codecs: Iterable[Codec]) -> list[Task]:
 
 
 def run(tasks: Sequence[Task], jobs: int, finished: Callable[[Row | Failure], None]) -> None:
-    """Runs the tasks in processes of one thread each, in any order.
-
-    If `finished` raises or the user interrupts, all processes are stopped at once.
-
-    Args:
-        tasks: The tasks.
-        jobs: Number of processes.
-        finished: Called with each result.
-
-    Raises:
-        LimitError: A process was killed, most likely for want of memory.
-    """
-    before = {name: os.environ.get(name) for name in ONE_THREAD}
-    os.environ.update(ONE_THREAD)
-    try:
-        context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(min(jobs, len(tasks)), context, _start) as pool:
-            try:
-                for future in as_completed([pool.submit(measure, t) for t in tasks]):
-                    finished(future.result())
-            except BaseException:  # Ctrl-C too must leave no worker behind
-                for process in multiprocessing.active_children():
-                    process.terminate()
-                pool.shutdown(cancel_futures=True)
-                raise
-    except BrokenProcessPool:
-        raise LimitError("a worker process was killed, most likely for want of memory; "
-                         "try fewer --jobs") from None  # fmt: skip
-    finally:
-        for name, value in before.items():
-            os.environ.pop(name) if value is None else os.environ.update({name: value})
-
-
-def _start() -> None:
-    """Prepares a worker: Ctrl-C is left to the main process, and OpenCV uses one thread."""
-    import signal
-
-    import cv2
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    cv2.setNumThreads(1)
+    """Runs the tasks in `jobs` worker processes; see `workers.run`."""
+    workers.run(measure, tasks, jobs, finished)
 
 
 def measure(task: Task) -> Row | Failure:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError, UsageError
+from . import bench_paper
 from .common import EXIT_CODES, Bar, parser, printable, run
 
 if TYPE_CHECKING:
@@ -26,7 +27,9 @@ Pictures with transparency are judged on black and on white; codecs without it l
 def arguments() -> argparse.ArgumentParser:
     """Parser of the command line."""
     p = parser("pxi-bench", "Measure the codec beside others.")
-    rd = p.add_subparsers(dest="benchmark", required=True, metavar="BENCHMARK").add_parser(
+    tools = p.add_subparsers(dest="benchmark", required=True, metavar="BENCHMARK")
+    bench_paper.add(tools)
+    rd = tools.add_parser(
         "rd", prog="pxi-bench", usage="pxi-bench rd [options] FOLDER", allow_abbrev=False,
         help="rate-distortion: BD-rates and plots", description=RD, epilog=EXIT_CODES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -61,7 +64,8 @@ def main(argv: list[str] | None = None) -> int:
     """Entry point; returns the exit code."""
     args = arguments().parse_args(argv)
     words = sys.argv[1:] if argv is None else argv
-    return run("pxi-bench", lambda: rate_distortion(args, shlex.join(["pxi-bench", *words])))
+    work = bench_paper.work if args.benchmark == "paper" else rate_distortion
+    return run("pxi-bench", lambda: work(args, shlex.join(["pxi-bench", *words])))
 
 
 def rate_distortion(args: argparse.Namespace, command: str) -> None:

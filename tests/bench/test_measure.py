@@ -8,11 +8,13 @@ from proxyimg_codec.bench.measure import (
     bd_rate,
     decibel,
     front,
+    mean_square,
     ms_ssim,
     pchip,
     psnr,
     quality_at,
     smooth,
+    ssim,
 )
 from tests.support.codecs import picture
 
@@ -45,6 +47,19 @@ def test_psnr_with_alpha_is_what_is_seen_on_black_and_on_white():
     other = half.copy()
     other[..., 0] = 160
     assert psnr(half, other) == pytest.approx(10 * math.log10(255**2 / ((100 * 51 / 255) ** 2 / 3)))
+
+
+def test_ssim_of_known_pictures():
+    a = np.full((20, 30, 3), 100, np.uint8)
+    assert ssim(a, a) == pytest.approx(1)
+    # Without contrast only the luminance term counts.
+    b = a + np.uint8(50)
+    c = (0.01 * 255) ** 2
+    assert ssim(a, b) == pytest.approx((2 * 100 * 150 + c) / (100**2 + 150**2 + c))
+    noise = np.random.default_rng(0).integers(0, 256, (2, 40, 40, 3)).astype(np.uint8)
+    assert abs(ssim(*noise)) < 0.1
+    assert math.isnan(ssim(a[:8], a[:8]))
+    assert mean_square(a, b) == 2500
 
 
 def slow_ms_ssim(x, y):

@@ -155,13 +155,13 @@ def test_help_prints_under_any_encoding(tool):
 
 
 def test_all_subcommands_are_looked_at():
-    assert len(list(parsers(bench.arguments()))) == 2
+    assert len(list(parsers(bench.arguments()))) == 3
 
 
 @pytest.mark.parametrize(
     "setting", [{"PYTHONIOENCODING": "ascii"}, {"LC_ALL": "C", "PYTHONUTF8": "0"}]
 )
-@pytest.mark.parametrize("tool", [["bench"], ["bench", "rd"], ["encode"]])
+@pytest.mark.parametrize("tool", [["bench"], ["bench", "rd"], ["bench", "paper"], ["encode"]])
 def test_help_where_only_ascii_prints(tool, setting):
     environment = {**os.environ, "PYTHONCOERCECLOCALE": "0", **setting}
     command = [sys.executable, ROOT / "bin" / f"pxi-{tool[0]}", *tool[1:], "--help"]

@@ -1,0 +1,1 @@
+"""Short implementations of other representations of pictures, to compare with; they need torch."""
