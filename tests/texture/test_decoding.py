@@ -41,7 +41,7 @@ def test_windows_are_parts_of_the_whole(tile, model):
         allowed = 0 if kernel.available() else 1e-5
         found = fresh.samples(window)[window.at]
         np.testing.assert_allclose(found, whole[window.at], rtol=0, atol=allowed)
-        np.testing.assert_allclose(fresh.raster, whole, rtol=0, atol=allowed)
+    np.testing.assert_allclose(fresh.raster, whole, rtol=0, atol=allowed)
 
 
 @pytest.mark.parametrize("level", [1, 2, 3])
