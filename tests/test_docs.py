@@ -36,7 +36,9 @@ def with_blocks(language):
 
 def commands(page):
     lines = [
-        shlex.split(line, comments=True) for b in blocks(page, "sh") for line in b.splitlines()
+        shlex.split(line, comments=True)
+        for b in blocks(page, "sh")
+        for line in b.replace("\\\n", " ").splitlines()
     ]
     return [words for words in lines if words and words[0] != "make"]
 

@@ -140,7 +140,7 @@ def table(chapter):
         (
             "8-pyramid.md",
             (registered_model, context, laplace, planes, pyramid, completion, lifts),
-            15,
+            16,
         ),
     ],
 )

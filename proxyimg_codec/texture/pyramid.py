@@ -155,9 +155,8 @@ class PyramidTexture:
         """Samples of the part that show if nothing has moved, bool [height, width]; None = all."""
         if self.cuts is None and self.mask is None and self.matte is None:
             return None
-        shown = self._present
-        if self.cuts is None or self.cuts.own is None:
-            shown = shown & ~self.soft
+        own = self.cuts is not None and self.cuts.own is not None
+        shown = self._present if own else self._present & ~self.soft
         return None if shown.all() else shown
 
     @property
