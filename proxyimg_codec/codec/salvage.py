@@ -168,7 +168,9 @@ _REMADE = (pose.TYPE, texr.TYPE, plan.TYPE)
 
 def _without(texture: Values, count: int) -> Values:
     """Values of a pyramid texture that names none but the first `count` planes."""
-    own = {**texture, **{k: 0 for k in ("alpha", "behind", "behind_alpha") if texture[k] > count}}
+    own = {**texture, **{k: 0 for k in texr.PLANES if texture[k] > count}}
+    if not own["behind"]:
+        own["matte"] = 0
     if not own["behind"] or not own["alpha"]:
         own["behind_alpha"] = 0
     if own["planes"] < count:
@@ -181,9 +183,7 @@ def _renumbered(texture: Values, numbers: Mapping[int, int]) -> Values:
     """Values of a texture whose planes have new numbers."""
     if texture["coder"] != texr.PYRAMID:
         return texture
-    others = {
-        k: 1 + numbers[texture[k] - 1] for k in ("alpha", "behind", "behind_alpha") if texture[k]
-    }
+    others = {k: 1 + numbers[texture[k] - 1] for k in texr.PLANES if texture[k]}
     return {**texture, "planes": numbers[texture["planes"]], **others}
 
 

@@ -9,7 +9,7 @@ import pytest
 
 import proxyimg_codec as pxi
 from conformance.make.builders import Numbers
-from conformance.make.valid import behind, pyramids, views
+from conformance.make.valid import behind, mattes, pyramids, views
 from conformance.make.valid.versions import planes_first
 from proxyimg_codec.cli.decode import DAMAGED
 from proxyimg_codec.container import plan
@@ -183,6 +183,19 @@ def test_without_textures_there_are_no_layers(layered, caplog):
     tail = tolerated(layered[:-12], caplog)
     np.testing.assert_array_equal(tail.render(), whole.render())
     assert len(tail.layers) == 2
+
+
+def test_soft_layers_do_without_what_is_missing(caplog):
+    """The file has the raster, then what is behind, then the matte."""
+    n = Numbers("soft layers")
+    soft = mattes.softened(n, views.pieces(n, {}), "disc")
+    data = pxi.Image(soft).to_bytes()
+    ends = [c.offset for c in read(data) if c.type == plan.TYPE]
+    found = []
+    for stop in (*(at + 4 for at in ends[1:]), len(data) - 13):
+        texture = tolerated(data[:stop], caplog).layers["disc"].texture
+        found.append((texture.behind is not None, texture.matte is not None))
+    assert found == [(False, False), (True, False), (True, True)]
 
 
 @pytest.mark.parametrize("name", ["flat", "layered"])
