@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import shlex
 import sys
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import InputError, UsageError
 from . import bench_paper
-from .common import EXIT_CODES, Bar, parser, printable, run
+from .common import EXIT_CODES, Bar, parser, printable, processes_of, run
 
 if TYPE_CHECKING:
     from ..bench.peers import Codec
@@ -85,9 +84,7 @@ def rate_distortion(args: argparse.Namespace, command: str) -> None:
     folder = folder_of(args)
     rates = parse_range(args.range)
     chosen = choose(args)
-    jobs = (os.cpu_count() or 1) if args.jobs is None else args.jobs
-    if jobs < 1:
-        raise UsageError(f"--jobs {jobs}: at least one process is needed")
+    jobs = processes_of(args)
     old = [] if args.reuse is None else read_csv(args.reuse)
     out = Path(args.out)
     check_out(out, args)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import os
 from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 from ..bench.paper import MISSING, SECTIONS
 from ..errors import InputError, UsageError
-from .common import EXIT_CODES, Bar
+from .common import EXIT_CODES, Bar, processes_of
 
 if TYPE_CHECKING:
     from ..bench.rd import Failure
@@ -65,9 +64,7 @@ def work(args: argparse.Namespace, command: str) -> None:
     unknown = [n for n in names if n not in SECTIONS]
     if unknown:
         raise UsageError(f"--only: unknown section {unknown[0]!r}; there are {', '.join(SECTIONS)}")
-    jobs = (os.cpu_count() or 1) if args.jobs is None else args.jobs
-    if jobs < 1:
-        raise UsageError(f"--jobs {jobs}: at least one process is needed")
+    jobs = processes_of(args)
     data, out = Path(args.data), Path(args.out)
     check_out(out, args)
     plan = run.plan(data, names, QUICK if args.quick else FULL)

@@ -73,6 +73,23 @@ def limits_of(args: argparse.Namespace) -> Limits:
     return Limits(**changes)
 
 
+def jobs_of(args: argparse.Namespace) -> int:
+    """Threads or processes that the option --jobs asks for: without it, one for each core."""
+    return (os.cpu_count() or 1) if args.jobs is None else int(args.jobs)
+
+
+def processes_of(args: argparse.Namespace) -> int:
+    """Processes that the option --jobs asks for.
+
+    Raises:
+        UsageError: There are none.
+    """
+    jobs = jobs_of(args)
+    if jobs < 1:
+        raise UsageError(f"--jobs {jobs}: at least one process is needed")
+    return jobs
+
+
 def run(prog: str, work: Callable[[], None]) -> int:
     """Runs a tool, and turns its errors into one line on stderr and an exit code.
 

@@ -15,7 +15,7 @@ from typing import Any
 from ..io.names import is_picture
 from .batch.each import each
 from .batch.tool import Tool, add_batch
-from .common import Bar, parser, printable
+from .common import Bar, jobs_of, parser, printable
 from .layered_input import encoded_layers, layered_input
 from .places import (
     add_files,
@@ -337,7 +337,7 @@ def settings_from(args: argparse.Namespace) -> Any:
     names_of_settings = {f.name for f in fields(Settings)}
     given = {k: v for k, v in vars(args).items() if k in names_of_settings and v is not None}
     values = PRESETS[args.preset] | given
-    values["jobs"] = (os.cpu_count() or 1) if args.jobs is None else args.jobs
+    values["jobs"] = jobs_of(args)
     if args.layers:
         values["max_layers"] = 1
     return Settings(**values)

@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from .common import parser, printable, run, warnings_shown
+from .common import jobs_of, parser, printable, run, warnings_shown
 from .places import check_names, check_target, in_and_out, parse, same_file
 from .prompt_flags import add_prompts, check_prompts, found_layers
 
@@ -64,7 +64,7 @@ def layers_file(args: argparse.Namespace) -> None:
     from ..io.raster import read, write
 
     started = time.perf_counter()
-    settings = Settings(jobs=(os.cpu_count() or 1) if args.jobs is None else args.jobs)
+    settings = Settings(jobs=jobs_of(args))
     picture = read(source, frame=args.frame)
     regions = found_layers(picture.pixels, args, settings.jobs)
     if len(regions) == 1 and not args.quiet:

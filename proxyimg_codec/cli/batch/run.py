@@ -18,7 +18,7 @@ from typing import IO, Any
 
 from ..._version import __version__
 from ...errors import InputError
-from ..common import Bar, printable
+from ..common import Bar, jobs_of, printable
 from ..places import check_target
 from . import records
 from .pools import Here, Pool, Processes
@@ -82,7 +82,7 @@ def pool_of(args: argparse.Namespace, count: int) -> Pool:
         from .on_ray import OnRay
 
         return OnRay(args.jobs)
-    cores = (os.cpu_count() or 1) if args.jobs is None else args.jobs
+    cores = jobs_of(args)
     processes = min(cores, count)
     return Here() if processes == 1 else Processes(processes, max(1, cores // processes))
 
@@ -90,7 +90,7 @@ def pool_of(args: argparse.Namespace, count: int) -> Pool:
 def _jobs(tool: Tool, args: argparse.Namespace, found: list[tuple[str, str]]) -> Iterator[Job]:
     """Jobs of a batch, in order. They name all files from the root, for workers elsewhere."""
     away = args.dask is not None or args.ray
-    cores = (os.cpu_count() or 1) if args.jobs is None else args.jobs
+    cores = jobs_of(args)
     threads = 1 if away else max(1, cores // len(found))
     settings = {k: _whole(v) for k, v in sorted(vars(args).items()) if k not in PLACES}
     told = {k: records.digest_of(v) if _is_file(v) else v for k, v in settings.items()}
