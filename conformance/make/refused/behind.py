@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -63,23 +63,35 @@ def _alone(b: Base) -> bytes:
     return write(chunks[:OWN] + chunks[SOFT:])
 
 
-def _versions(version: tuple[int, int], count: int) -> Callable[[Base], bytes]:
-    """Builder of a file of a version whose textures have `count` values."""
+def aged(
+    version: tuple[int, int], count: int, textures: Sequence[int], own: int, **without: Any
+) -> Callable[[Base], bytes]:
+    """Builder of a file of a version, without planes that views of earlier ones cannot name.
+
+    Args:
+        version: Version of the file.
+        count: Number of values that its textures have.
+        textures: Positions of the TEXR chunks in the base file.
+        own: Position of the first PLAN chunk that is left out; with those behind it.
+        without: Values of textures that no longer name them.
+    """
 
     def build(b: Base) -> bytes:
         chunks = list(b.chunks)
-        for at in (BACK_TEXR, DISC_TEXR):
-            kept = list(values(different(b, at, behind=0, behind_alpha=0)).values())
+        for at in textures:
+            kept = list(values(different(b, at, **without)).values())
             chunks[at] = replace(chunks[at], payload=msgpack.packb(kept[:count]))
-        plans = [c for c in chunks[:OWN] if c.type == plan.TYPE]
-        if version < plan.TILED_FROM:
-            textures = chunks[BACK_TEXR : DISC_TEXR + 1]
-            return write(
-                [*chunks[:BACK_TEXR], *map(short, plans), *textures, chunks[TAIL]], version
-            )
-        return write([*chunks[:OWN], chunks[TAIL]], version)
+        if version >= plan.TILED_FROM:
+            return write([*chunks[:own], chunks[-1]], version)
+        plans = [short(c) for c in chunks[:own] if c.type == plan.TYPE]
+        views = [chunks[at] for at in textures]
+        return write([*chunks[: textures[0]], *plans, *views, chunks[-1]], version)
 
     return build
+
+
+def _versions(version: tuple[int, int], count: int) -> Callable[[Base], bytes]:
+    return aged(version, count, (BACK_TEXR, DISC_TEXR), OWN, behind=0, behind_alpha=0)
 
 
 def short(chunk: Chunk) -> Chunk:

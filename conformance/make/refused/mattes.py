@@ -3,20 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
-import msgpack
-
-from proxyimg_codec.container import plan
-from proxyimg_codec.container.chunks import write
 from proxyimg_codec.model import Picture
 
-from ..builders import Numbers, values
+from ..builders import Numbers
 from ..valid.mattes import softened
 from ..valid.views import pieces
 from .base import Base, Row, refused
-from .behind import short
-from .pyramids import different
+from .behind import aged
 
 HEAD, BACK, DISC, BAR, BACK_TEXR, DISC_TEXR, BAR_TEXR, PLAN, OWN, MATTE, TAIL = range(11)
 """Positions of the chunks in the base file."""
@@ -31,19 +25,8 @@ class Mattes(Base):
 
 
 def _version(version: tuple[int, int], count: int) -> Callable[[Base], bytes]:
-    """Builder of a file of a version, without a matte, whose textures have `count` values."""
-
-    def build(b: Base) -> bytes:
-        chunks = list(b.chunks)
-        for at in (BACK_TEXR, DISC_TEXR, BAR_TEXR):
-            kept = list(values(different(b, at, behind=0, matte=0)).values())
-            chunks[at] = replace(chunks[at], payload=msgpack.packb(kept[:count]))
-        layers, textures = chunks[:BACK_TEXR], chunks[BACK_TEXR:PLAN]
-        if version < plan.TILED_FROM:
-            return write([*layers, short(chunks[PLAN]), *textures, chunks[TAIL]], version)
-        return write([*layers, *textures, chunks[PLAN], chunks[TAIL]], version)
-
-    return build
+    textures = BACK_TEXR, DISC_TEXR, BAR_TEXR
+    return aged(version, count, textures, OWN, behind=0, matte=0)
 
 
 # fmt: off
