@@ -41,7 +41,7 @@ class Rival(torch.nn.Module):
 
     def forward(self, place: torch.Tensor) -> torch.Tensor:
         """Colours float32 [N, 3] at places float32 [N, 2] (x, y), -1..1 from edge to edge."""
-        raise NotImplementedError
+        raise NotImplementedError  # each rival has its own
 
 
 Maker = Callable[[], Rival]

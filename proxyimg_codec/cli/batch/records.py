@@ -109,6 +109,6 @@ def _lock(number: int) -> None:
     except ImportError:  # Windows
         import msvcrt
 
-        msvcrt.locking(number, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined,unused-ignore] # there
+        msvcrt.locking(number, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined,unused-ignore] # on Windows alone
     else:
         fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
