@@ -100,16 +100,42 @@ def colours(model: Model, planes: Floats, step: int, level: int = 0) -> Floats:
     Returns:
         float32 [h, w, 3] colours in 0..255, not clipped.
     """
-    matrix = model.to_colour.floats
-    for left_out in range(1, level + 1):
-        matrix = (matrix @ _evenly(model, left_out)).astype(np.float32)
-    matrix = matrix * np.float32(2 ** (step / 64))
+    matrix = _colour_matrix(model, step, level)
     if kernel.available():
         return kernel.coloured(np.ascontiguousarray(planes), matrix)
     out = np.empty_like(planes)
     for top, bottom in strips(*planes.shape[:2]):
         out[top:bottom] = planes[top:bottom] @ matrix.T + 128
     return out
+
+
+def put_samples(model: Model, planes: Floats, step: int, level: int, out: Floats) -> None:
+    """Puts the colours of planes, as samples in 0..1.
+
+    Args:
+        model: The registered model.
+        planes: float32 [h, w, 3] planes above a level.
+        step: Quantization step, as in PLAN.
+        level: Number of the levels below, as for `colours`.
+        out: float32 [h, w, 3], or [h, w, 1] for the mean of the components.
+    """
+    if kernel.available() and out.shape[2] == 3 and out.flags.c_contiguous:
+        kernel.shown(np.ascontiguousarray(planes), _colour_matrix(model, step, level), out)
+        return
+    found = colours(model, planes, step, level)
+    if out.shape[2] == 1:
+        found = found.mean(2, keepdims=True)
+    found /= 255
+    np.clip(found, 0, 1, out=out)
+
+
+def _colour_matrix(model: Model, step: int, level: int) -> Floats:
+    """Weights [3, 3] of planes above a level in each component."""
+    matrix = model.to_colour.floats
+    for left_out in range(1, level + 1):
+        matrix = (matrix @ _evenly(model, left_out)).astype(np.float32)
+    scaled: Floats = matrix * np.float32(2 ** (step / 64))
+    return scaled
 
 
 def _evenly(model: Model, level: int) -> NDArray[np.float64]:
