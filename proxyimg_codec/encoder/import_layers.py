@@ -133,6 +133,7 @@ def _stacked(
 ) -> Picture:  # fmt: skip
     """Encodes layers with pyramid textures."""
     from .pyramid.stack import encode_stack
+    from .pyramid.tiles import with_tiles
 
     def pixels_of(number: int, box: Box) -> Floats:
         pixels = _on_canvas(picture.layers[number], box)
@@ -145,7 +146,8 @@ def _stacked(
         return _merged([found], picture, covered)
 
     pairs = list(zip(plans, channels, strict=True))
-    return encode_stack(pairs, pixels_of, finished, composite(picture), settings, report)
+    found = encode_stack(pairs, pixels_of, finished, composite(picture), settings, report)
+    return with_tiles(found, settings)
 
 
 def _fitted(

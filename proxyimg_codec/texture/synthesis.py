@@ -71,14 +71,20 @@ def finer(
     """
     weights = model.synthesis[min(level, len(model.synthesis)) - 1]
     t = np.float32((step - STEP_ORIGIN) / 128)
-    # In double precision, so that all machines round it to the same numbers.
-    gain = np.exp(weights.gain.floats + weights.gain_by_step.floats * t, dtype=np.float64)
-    gain = gain.astype(np.float32)
+    gain = _gains(weights, step)
     bias = weights.first_bias.floats + weights.first_by_step.floats * t
     linear = _linear(model, level).astype(np.float32)
     if kernel.available():
         return synthesis_native.finer(weights, linear, gain, bias, low, latents, shape)
     return _filtered(weights, linear, gain, bias, low, latents, shape)
+
+
+def _gains(weights: Synthesis, step: int) -> Floats:
+    """Gains [9] of latents."""
+    t = np.float32((step - STEP_ORIGIN) / 128)
+    # In double precision, so that all machines round it to the same numbers.
+    gain = np.exp(weights.gain.floats + weights.gain_by_step.floats * t, dtype=np.float64)
+    return gain.astype(np.float32)
 
 
 def _linear(model: Model, level: int) -> NDArray[np.float64]:
@@ -159,10 +165,10 @@ def details(model: Model, latents: Sequence[Ints], step: int, size: tuple[int, i
         For each level the root mean square of what it adds, in 8-bit levels.
     """
     weight = np.square(model.to_colour.floats * 2 ** (step / 64)).mean(0)  # of each colour
-    t, out = (step - STEP_ORIGIN) / 128, []
+    out = []
     for level, found in enumerate(latents, 1):
         weights = model.synthesis[min(level, len(model.synthesis)) - 1]
-        gain = np.exp(weights.gain.floats + weights.gain_by_step.floats * t)
+        gain = _gains(weights, step).astype(np.float64)
         power = np.square(found.astype(np.float64)).sum((1, 2)) * gain**2
         total = float((power.reshape(3, 3).sum(1) * weight).sum())
         out.append(float(np.sqrt(total / (size[0] * size[1]))))
