@@ -26,7 +26,7 @@ from .encode import Progress, check_blocks, fit_image
 from .implicit.fit_problem import Problem, build_apart
 from .layered.source import LayeredPicture, SourceLayer
 from .settings import Settings
-from .shapes.layers import LayerPlan, Plan, plan_layers, with_room
+from .shapes.layers import LayerPlan, Plan, plan_layers
 from .shapes.masks import unique_names
 from .shapes.meshes import with_meshes
 
@@ -249,7 +249,6 @@ def _plan(layer: SourceLayer, picture: LayeredPicture, settings: Settings) -> Pl
     y1 = min(layer.y + height + MARGIN, picture.height)
     alone = _on_canvas(layer, (x0, y0, x1 - x0, y1 - y0))
     plan = plan_layers(alone, replace(settings, max_layers=1), None)
-    plan = with_room(plan, alone[..., 3], settings) if settings.pyramid else plan
     outline = plan.layers[0].boundary
     if outline is None:
         return replace(plan, layers=(LayerPlan(layer.name, None),))
