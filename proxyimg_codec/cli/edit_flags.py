@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import re
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -272,6 +273,19 @@ def _merge(layer: str, other: str) -> Values:
     return {"op": "merge", "layer": key(layer), "other": key(other)}
 
 
+def _animate(text: str) -> Values:
+    from ..animate.presets import PRESETS
+    from ..io.files import read_bytes
+
+    if text in PRESETS:
+        return {"op": "animate", "motion": {"version": 1, "preset": text}}
+    where, words = ("--animate", text) if text.startswith("{") else (text, None)
+    try:
+        return {"op": "animate", "motion": json.loads(words or read_bytes(text))}
+    except (ValueError, RecursionError) as error:
+        raise UsageError(f"{where}: is not valid JSON: {error}") from None
+
+
 def _group(text: str) -> Values:
     name, given, layers = text.partition("=")
     if not given:
@@ -332,6 +346,8 @@ FLAGS = (
         "front, back, forward, backward, or a position from the back"),
     Flag("--hide", _named("hide"), ["NAME"], "stop drawing"),
     Flag("--show", _named("show"), ["NAME"], "draw again"),
+    Flag("--animate", _animate, ["MOTION"],
+        "let layers move: a preset of pxi-animate, a motion file, or its JSON"),
     Flag("--still", _named("still"), ["NAME"], "forget the motion"),
     Flag("--opacity", _geometry("opacity", value=1), ["NAME", "0-1"], "set the opacity"),
     Flag("--texture", _texture, ["NAME=SOURCE"],
