@@ -17,22 +17,20 @@ from starlette.routing import Route
 
 from ..errors import PxiError, UsageError
 from ..io.files import read_bytes
-from . import drawing, poses
+from . import drawing
 from .autosave import plain_name
 from .content import Content, is_layered, opened
+from .drawing_routes import DrawingRoutes
 from .exporting import export
 from .failures import MissingError, described
 from .jobs import Job
 from .region_requests import changed, searched
 from .requests import (
-    binary_answer,
     body_of,
     json_of,
     number_of,
     picture_answer,
-    pixels_answer,
     text_of,
-    wanted_of,
 )
 from .session import Change, Session
 
@@ -58,7 +56,7 @@ def application(session: Session, gone: Callable[[], None] = lambda: None, **mor
         gone: Called when the last page that listened to events has left.
         more: Arguments of Starlette, such as ``lifespan``.
     """
-    routes = _Routes(session, gone)
+    routes, drawn = _Routes(session, gone), DrawingRoutes(session)
     paths: list[tuple[str, str, Handler]] = [
         ("GET", "/", routes.page),
         ("GET", "/page/{path:path}", routes.page),
@@ -76,14 +74,14 @@ def application(session: Session, gone: Callable[[], None] = lambda: None, **mor
         ("POST", "/api/redo", routes.redo),
         ("POST", "/api/jump", routes.jump),
         ("POST", "/api/cancel", routes.cancel),
-        ("GET", "/api/render", routes.render),
-        ("GET", "/api/layers/{index:int}/thumbnail.png", routes.thumbnail),
-        ("GET", "/api/layers/{index:int}/texture", routes.texture),
-        ("GET", "/api/layers/{index:int}/mesh", routes.mesh),
-        ("GET", "/api/layers/{index:int}/outline", routes.outline),
-        ("GET", "/api/presets", routes.presets),
-        ("GET", "/api/motion", routes.motion),
-        ("POST", "/api/motion", routes.simulate),
+        ("GET", "/api/render", drawn.render),
+        ("GET", "/api/layers/{index:int}/thumbnail.png", drawn.thumbnail),
+        ("GET", "/api/layers/{index:int}/texture", drawn.texture),
+        ("GET", "/api/layers/{index:int}/mesh", drawn.mesh),
+        ("GET", "/api/layers/{index:int}/outline", drawn.outline),
+        ("GET", "/api/presets", drawn.presets),
+        ("GET", "/api/motion", drawn.motion),
+        ("POST", "/api/motion", drawn.simulate),
         ("POST", "/api/save", routes.save),
         ("POST", "/api/export", routes.export),
         ("GET", "/api/exports/{name}", routes.exported),
@@ -306,104 +304,6 @@ class _Routes:
         """Ends the work that is going on."""
         self._session.cancel()
         return JSONResponse({})
-
-    # Drawing
-
-    async def render(self, request: Request) -> Response:
-        """Exact picture of a region at a size."""
-        query, session = request.query_params, self._session
-        picture = session.content.edited.picture
-        wanted = wanted_of(query, picture.size)
-
-        def work(job: Job) -> Response:
-            pixels = drawing.exact(picture, wanted, session.limits, session.cache, job.advance)
-            return pixels_answer(pixels, query.get("format", "png"))
-
-        return await self._drawn(request, work)
-
-    async def thumbnail(self, request: Request) -> Response:
-        """One layer as it is now, small."""
-        session = self._session
-        index, picture = self._layer(request)
-        side = int(number_of(request.query_params, "side", 1, 1024) or 96)
-
-        def work(job: Job) -> Response:
-            return pixels_answer(
-                drawing.thumbnail(picture, index, side, session.limits, session.cache, job.advance),
-                "png",
-            )
-
-        return await self._drawn(request, work)
-
-    async def texture(self, request: Request) -> Response:
-        """Texture of a layer at rest."""
-        session, query = self._session, request.query_params
-        index, picture = self._layer(request)
-        scale = number_of(query, "scale", 1 / 64, 16) or 1.0
-
-        def work(job: Job) -> Response:
-            pixels, box = drawing.texture(picture, index, scale, session.limits, job.advance)
-            more = {"x-box": ",".join(map(str, box))}
-            return pixels_answer(pixels, query.get("format", "raw"), more)
-
-        return await self._drawn(request, work)
-
-    async def mesh(self, request: Request) -> Response:
-        """Mesh of a layer."""
-        index, picture = self._layer(request)
-        layer = picture.layers[index]
-        return JSONResponse(await self._session.read(lambda: drawing.mesh(picture, layer)))
-
-    async def outline(self, request: Request) -> Response:
-        """Control points of the outline of a layer."""
-        index, picture = self._layer(request)
-        layer = picture.layers[index]
-        paths = await self._session.read(lambda: drawing.control_points(layer))
-        return JSONResponse({"paths": paths})
-
-    def _layer(self, request: Request) -> tuple[int, Any]:
-        """Number of a layer of the present picture, and that picture."""
-        picture, index = self._session.content.edited.picture, request.path_params["index"]
-        if index >= len(picture.layers):
-            raise MissingError(f"there is no layer {index}; there are {len(picture.layers)}")
-        return index, picture
-
-    async def _drawn(self, request: Request, work: Callable[[Job], Response]) -> Response:
-        """Answers with what is drawn in a thread, which ends when nobody waits for it any more."""
-        job = Job("render")
-        drawn = asyncio.ensure_future(self._session.read(lambda: work(job)))
-        while not drawn.done():
-            await asyncio.wait([drawn], timeout=0.05)
-            if not drawn.done() and await request.is_disconnected():
-                job.cancel()
-        return drawn.result()
-
-    # Motion
-
-    async def presets(self, request: Request) -> Response:
-        """Presets of motions."""
-        return JSONResponse(poses.known_presets())
-
-    async def motion(self, request: Request) -> Response:
-        """Poses of the motion that the picture has."""
-        picture = self._session.content.edited.picture
-        if picture.timeline is None:
-            raise MissingError("the picture does not move")
-        return binary_answer(await self._session.read(lambda: poses.packed(picture)))
-
-    async def simulate(self, request: Request) -> Response:
-        """Poses of a motion that the picture does not have as yet."""
-        values, session = await json_of(request), self._session
-        picture = session.content.edited.picture
-        job = Job("motion", lambda job: session.publish_from_thread("job", job.described()))
-
-        def work() -> tuple[bytes, str]:
-            motion = poses.motion_of(picture, values)
-            moving = poses.moving(picture, motion, job)
-            return poses.packed(moving), json.dumps(motion.to_dict())
-
-        data, words = await session.read(work, job)
-        return binary_answer(data, {"x-motion": words})
 
     # Saving
 
