@@ -2,7 +2,7 @@
 import { post, Refused, upload } from "./server.js";
 import { preview, meshOf } from "./scene.js";
 import { arrived, emit, layerOf, on, select, store } from "./store.js";
-import { h } from "./dom.js";
+import { h, size } from "./dom.js";
 
 /** Says something in place. @param {string} text @param {{kind?: "info"|"error"|"done", actions?: [string, () => void][]}} [options] */
 export const say = (text, options = {}) => emit("message", { text, ...options });
@@ -80,7 +80,13 @@ export function choose(accept, done) {
   input.click();
 }
 
+/** Saves; what has no file of its own, as it was dropped, is downloaded. */
 export async function save() {
+  if (!store.state.target) {
+    say("Writing the file\u2026");
+    await act(() => post("/api/export", { kind: "pxi" }));
+    return;
+  }
   const state = await act(() => post("/api/save", { replace: true }));
   if (state) say(`Saved ${store.state.target ?? store.state.name}.`, { kind: "done" });
 }
@@ -135,6 +141,18 @@ function offer(what, back) {
   });
 }
 
+/** Puts a finished file where downloads go. @param {{url: string, name: string}} file */
+function download({ url, name }) {
+  const link = h("a", { href: url, download: name, class: "away" });
+  document.body.append(link);
+  link.click();
+  link.remove();
+}
+
 on("job-end", (job) => {
+  if (job.ok && job.kind === "export") {
+    download(job.result);
+    say(`${job.result.name}, ${size(job.result.bytes)}.`, { kind: "done" });
+  }
   if (!job.ok && job.error && job.error.kind !== "cancelled") say(job.error.message, { kind: "error" });
 });

@@ -185,7 +185,9 @@ on("tool", () => {
   bars();
 });
 
-// Keys.
+// Keys. The canvas shows that it has the focus only to those who walk with the keyboard.
+addEventListener("keydown", (e) => { if (e.key === "Tab") document.body.classList.add("keys"); }, true);
+addEventListener("pointerdown", () => document.body.classList.remove("keys"), true);
 const typing = (/** @type {Event} */ e) => /** @type {Element} */ (e.target).matches?.("input:not([type=range]):not([type=checkbox]), select, textarea");
 addEventListener("keydown", (e) => {
   if (typing(e)) return;

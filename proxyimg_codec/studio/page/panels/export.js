@@ -67,9 +67,5 @@ on("job-end", (j) => {
   if (!j.ok) return;
   const done = root.querySelector(".result");
   done?.append(h("a", { href: j.result.url, download: j.result.name }, `${j.result.name}`), ` ${size(j.result.bytes)}`);
-  const link = h("a", { href: j.result.url, download: j.result.name, class: "away" });
-  document.body.append(link);
-  link.click();
-  link.remove();
 });
 on("state", () => { if (store.state.stage !== "editing") root.hidden = true; });

@@ -53,18 +53,22 @@ stage.append(empty, waiting, dropping);
 on("dropping", show);
 on("state", () => { empty.hidden = store.state.stage !== "empty" || !waiting.hidden; });
 on("opening", (name) => {
-  waiting.hidden = !name;
-  waiting.lastChild.textContent = name ? `Opening ${name}` : "";
+  if (name) waiting.classList.remove("corner");
+  waiting.hidden = !name && !waiting.classList.contains("corner");
+  if (name) waiting.lastChild.textContent = `Opening ${name}`;
   empty.hidden = store.state.stage !== "empty" || Boolean(name);
 });
-on("job", (job) => {
-  const busy = (job.kind === "encode" && store.state.stage !== "pointing") || job.kind === "find";
-  if (!busy) return;
+const corner = (/** @type {string} */ text) => {
   waiting.hidden = false;
   waiting.classList.add("corner");
-  waiting.lastChild.textContent = job.kind === "find" ? "Looking for layers" : `${job.stage || "Encoding"}${job.total ? ` ${Math.round((100 * job.done) / job.total)}\u2009%` : ""}`;
+  waiting.lastChild.textContent = text;
+};
+const done = () => { waiting.hidden = true; waiting.classList.remove("corner"); };
+on("state", (before) => { if (store.state.stage === "pointing" && before.stage !== "pointing" && store.state.regions.length < 2) corner("Looking for layers"); });
+on("job", (job) => {
+  if (job.kind === "encode" && store.state.stage !== "pointing") corner(`${job.stage || "Encoding"}${job.total ? ` ${Math.round((100 * job.done) / job.total)}\u2009%` : ""}`);
 });
-on("job-end", () => { waiting.hidden = true; waiting.classList.remove("corner"); });
+on("job-end", (job) => { if (job.kind === "find" || job.kind === "encode") done(); });
 
 let leave = 0;
 addEventListener("dragover", (e) => {

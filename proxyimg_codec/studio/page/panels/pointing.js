@@ -1,6 +1,6 @@
 /** The panel of a raster whose layers are being pointed at, and its encoding. */
-import { act, regions } from "../actions.js";
-import { button, h, slider } from "../dom.js";
+import { act, cancel, regions, say } from "../actions.js";
+import { button, h, size, slider } from "../dom.js";
 import { post } from "../server.js";
 import { on, store } from "../store.js";
 import { brush } from "../tools/pointing.js";
@@ -26,33 +26,43 @@ export function pointing() {
 /** The foot of the side bar: quality, effort, and the button that makes the picture editable. */
 export const encoding = h("div", { class: "encoding" });
 
-/** @type {any} */
-let progress = null;
+/** The job that encodes, while it runs. @type {{stage: string, done: number, total: number}|null} */
+let running = null;
+const stage = h("span", { class: "stage-name" }), share = h("span", { class: "share" });
+const progress = h("progress", { max: 1, "aria-label": "Encoding" });
+const working = [h("div", { class: "line", role: "status" }, stage, share), progress, button({ text: "Cancel", icon: "x", class: "wide", id: "cancel-encode", onclick: cancel })];
+const asking = [
+  slider({ label: "Quality", min: 0, max: 100, value: settings.quality, oninput: (v) => { settings.quality = v; } }),
+  slider({ label: "Effort", min: 1, max: 9, value: settings.effort, oninput: (v) => { settings.effort = v; } }),
+  button({ text: "Make it editable", icon: "sparkles", class: "primary wide", id: "encode", onclick: start }),
+];
 
-function build() {
-  const { state } = store;
-  encoding.hidden = state.stage !== "pointing";
-  if (encoding.hidden || encoding.contains(document.activeElement) && !state.busy && !progress) return;
-  const running = state.busy?.kind === "encode";
-  if (running) {
-    if (progress) return;
-    progress = h("progress", { max: 1, "aria-label": "Encoding" });
-    encoding.replaceChildren(h("div", { class: "line" }, h("span", { class: "stage-name" }, "Encoding"), h("span", { class: "share" })), progress,
-      button({ text: "Cancel", class: "wide", onclick: () => post("/api/cancel").catch(() => {}) }));
-    return;
-  }
-  progress = null;
-  encoding.replaceChildren(
-    slider({ label: "Quality", min: 0, max: 100, value: settings.quality, oninput: (v) => { settings.quality = v; } }),
-    slider({ label: "Effort", min: 1, max: 9, value: settings.effort, oninput: (v) => { settings.effort = v; } }),
-    button({ text: "Make it editable", icon: "sparkles", class: "primary wide", id: "encode", onclick: () => act(() => post("/api/encode", { quality: settings.quality, effort: settings.effort })) }));
+async function start() {
+  running = { stage: "encoding", done: 0, total: 0 };
+  build();
+  if (!(await act(() => post("/api/encode", { quality: settings.quality, effort: settings.effort })))) running = null;
+  build();
 }
 
-on("state", build);
-on("job", (job) => {
-  if (job.kind !== "encode" || !progress) return;
-  if (job.total) progress.value = job.done / job.total;
-  const [name, share] = encoding.querySelectorAll(".line span");
-  name.textContent = job.stage ? job.stage[0].toUpperCase() + job.stage.slice(1) : "Encoding";
-  share.textContent = job.total ? `${Math.round((100 * job.done) / job.total)}\u2009%` : "";
+function build() {
+  encoding.hidden = store.state.stage !== "pointing";
+  const parts = running ? working : asking;
+  if (encoding.firstChild !== parts[0]) encoding.replaceChildren(...parts);
+  if (!running) return;
+  stage.textContent = running.stage[0].toUpperCase() + running.stage.slice(1);
+  share.textContent = running.total ? `${Math.round((100 * running.done) / running.total)}\u2009%` : "";
+  if (running.total) progress.value = running.done / running.total;
+  else progress.removeAttribute("value");
+}
+
+on("state", (before) => {
+  if (before.stage !== store.state.stage) running = null;
+  build();
+});
+on("job", (job) => { if (job.kind === "encode") { running = job; build(); } });
+on("job-end", (job) => {
+  if (job.kind !== "encode") return;
+  running = null;
+  build();
+  if (job.ok && job.result?.bytes) say(`${store.state.size[0]} \u00d7 ${store.state.size[1]} pixels in ${size(job.result.bytes)}.`, { kind: "done" });
 });
