@@ -206,11 +206,10 @@ def _texture(text: str) -> Values:
     target, given, source = text.partition("=")
     if not given or not source:
         raise ValueError
-    values: Values = {"op": "texture", "layer": key(target)}
-    if source.endswith("@shape"):
-        source, values["fit"] = source.removesuffix("@shape"), "shape"
+    fit = {"fit": "shape"} if source.endswith("@shape") else {}
+    source = source.removesuffix("@shape")
     file, layer = _foreign(source)
-    return {**values, "source": file or key(source), **layer}
+    return {"op": "texture", "layer": key(target), "source": file or key(source), **layer, **fit}
 
 
 def _generate(layer: str, prompt: str) -> Values:
@@ -224,20 +223,20 @@ def _foreign(source: str) -> tuple[str, Values]:
 
 
 def _insert(text: str) -> Values:
-    values: Values = {"op": "insert"}
     beside, given, source = text.partition("=")
+    where: Values = {}
     if given:
         side = "under" if beside.startswith("under:") else "over"
-        values[side] = key(beside.removeprefix("under:"))
+        where[side] = key(beside.removeprefix("under:"))
     else:
         source = text
     start, at, place = source.rpartition("@")
     if at and re.fullmatch(r"[-+.,\deE]+", place):
-        source, values["at"] = start, _floats(place, 2)
+        source, where = start, {"at": _floats(place, 2), **where}
     if not source:
         raise ValueError
     file, layer = _foreign(source)
-    return {**values, "source": file or source, **layer}
+    return {"op": "insert", "source": file or source, **layer, **where}
 
 
 def _recolour(layer: str, changes: str) -> Values:

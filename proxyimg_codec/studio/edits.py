@@ -82,7 +82,7 @@ def _refuse_others(edit: Mapping[str, Any], picture: Picture, files: Collection[
     Raises:
         UsageError: It does.
     """
-    layers = {layer.name for layer in picture.layers}
+    layers = [layer.name for layer in picture.layers]
     for key in FILES:
         value = edit.get(key)
         layered = edit["op"] == "texture" and (isinstance(value, int) or value in layers)
