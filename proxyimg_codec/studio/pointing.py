@@ -22,6 +22,9 @@ from .strokes import painted
 
 Mask = NDArray[np.bool_]
 
+SLIVER = 0.03
+"""Share of a region that must be seen, or it goes when others are put in front of it."""
+
 SPECK = 12.0
 """Area in pixels below which a part of a region has no outline in the page."""
 
@@ -94,9 +97,17 @@ class Pointing:
             np.logical_or.reduce(strokes) if strokes else None, old.mask,
         )  # fmt: skip
         prompt = Prompt(name, told.inside, told.outside, told.box, told.strokes, told.mask)
-        others = [v for v in self.regions if not is_back(v.name)]
-        stack = with_objects(self._floats(), others, [prompt], jobs=jobs)
-        return replace(self, regions=tuple(stack), hints={**self.hints, name: told})
+        region = self._prompted(prompt, jobs)
+        if known is None:
+            stack = [*self.regions, region]
+        else:
+            stack = [region if v is known else v for v in self.regions]
+        return replace(self, hints={**self.hints, name: told})._stacked(stack, kept=name)
+
+    def _prompted(self, prompt: Prompt, jobs: int) -> Region:
+        """Region that a prompt finds, whatever regions there are."""
+        found = with_objects(self._floats(), [], [prompt], jobs=jobs)
+        return next(v for v in found if v.name == prompt.name)
 
     def split(self, name: str, hints: Hints, to: str | None, jobs: int) -> Pointing:
         """Returns regions with a new one just in front of another, made of a part of that.
@@ -106,18 +117,17 @@ class Pointing:
         """
         whole = self._region(name)
         new = self._free(to or f"{name}/part")
-        stack = list(self.pointed(new, hints, jobs).regions)
-        part = next(v for v in stack if v.name == new)
-        inside = part.mask & whole.mask
+        prompt = Prompt(new, hints.inside, hints.outside, hints.box, hints.strokes)
+        inside = self._prompted(prompt, jobs).mask & whole.mask
         if not inside.any():
             raise UsageError(f'nothing of "{name}" is there; point at a part of it')
         if (inside == whole.mask).all():
             raise UsageError(f'this is all of "{name}"; also say what is outside of the part')
-        rest = [v for v in self.regions if v.name != new]
+        rest = list(self.regions)
         at = next(k for k, v in enumerate(rest) if v.name == name)
         rest.insert(at + 1, Region(new, inside))
         told = {**self.hints, new: replace(hints, mask=inside)}
-        return replace(self._stacked(rest), hints=told)
+        return replace(self, hints=told)._stacked(rest, kept=name)
 
     def painted(
         self, name: str, strokes: Sequence[Sequence[Point]], radius: float, erase: bool
@@ -137,7 +147,7 @@ class Pointing:
             others = {}
         changed = [others.get(v.name, v) for v in self.regions]
         changed[self.regions.index(region)] = Region(name, mask)
-        return self._stacked(changed, without=name)
+        return self._stacked(changed, without=name, kept=name)
 
     def renamed(self, name: str, to: str) -> Pointing:
         """Returns regions of which one has another name.
@@ -207,15 +217,30 @@ class Pointing:
     def _floats(self) -> NDArray[np.float32]:
         return np.asarray(to_float(self.raster.pixels)[0])
 
-    def _stacked(self, regions: Sequence[Region], without: str | None = None) -> Pointing:
-        """Pointing with other regions, which are completed to a stack; hints of one are dropped."""
+    def _stacked(
+        self, regions: Sequence[Region], without: str | None = None, kept: str | None = None
+    ) -> Pointing:
+        """Pointing with other regions, which are completed to a stack.
+
+        Regions of which others leave nothing to see, or a sliver, go.
+
+        Args:
+            regions: Regions back to front.
+            without: Name of a region whose hints go.
+            kept: Name of a region that stays, whatever there is to see of it.
+        """
         width, height = self.size
         alpha = self._floats()[..., 3]
         support = None if (alpha == 1).all() else alpha >= 0.5
-        hints = {k: v for k, v in self.hints.items() if k != without}
-        return replace(
-            self, regions=tuple(resolve(regions, height, width, support)), hints=hints
-        )  # fmt: skip
+        seen = zip(regions, visible(regions), strict=True)
+        there = [
+            v for k, (v, mask) in enumerate(seen)
+            if v.name == kept or (k == 0 and mask.any()) or mask.sum() > SLIVER * v.mask.sum()
+        ]  # fmt: skip
+        stack = resolve(there, height, width, support)
+        names = {v.name for v in stack} - {without}
+        hints = {k: v for k, v in self.hints.items() if k in names}
+        return replace(self, regions=tuple(stack), hints=hints)
 
     def _found(self, name: str) -> Region | None:
         return next((v for v in self.regions if v.name == name), None)

@@ -200,7 +200,7 @@ def test_python_in_words_does_the_same(name, small_pxi):
 
 @pytest.mark.parametrize("operation", [v for v, _ in BAD if isinstance(v, dict)])
 def test_bad_edits_are_refused(studio_of_small, operation):
-    if any(np.isnan(v) for v in np.ravel([v for v in operation.get("by", [])] or [0])):
+    if any(np.isnan(v) for v in np.ravel(list(operation.get("by", [])) or [0])):
         return  # JSON has no such number
     made = studio_of_small
     made.refused("usage", "POST", "/api/edit", json={"edits": [operation]})
