@@ -101,6 +101,7 @@ def _listening(port: int) -> Any:
             listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             listener.bind((HOST, port))
+            listener.listen()  # who has the address can connect already
         except (OSError, OverflowError) as error:
             raise InputError(
                 f"--port {port}: cannot be listened at: {error}; leave it out for a free one"
