@@ -12,6 +12,7 @@ import os
 import secrets
 import shutil
 import socket
+import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,9 @@ from ..errors import InputError
 from ..io.files import read_bytes, write_atomically
 
 STATE = "session.json"
+
+KEPT_DAYS = 30
+"""Days after which a session that nobody went on with is given up."""
 
 
 def default_folder() -> Path:
@@ -130,6 +134,18 @@ def broken_off(sessions: Path, file: str | None) -> Folder | None:
         if state and state.get("path") == file and not _alive(state.get("port")):
             return folder
     return None
+
+
+def sweep(sessions: Path) -> None:
+    """Removes sessions that nobody has gone on with for `KEPT_DAYS`."""
+    oldest = time.time() - KEPT_DAYS * 86400
+    with contextlib.suppress(OSError):
+        for path in [*sessions.iterdir()]:
+            state = path / STATE
+            if state.is_file() and state.stat().st_mtime < oldest:
+                folder = Folder(path)
+                if not _alive((folder.state() or {}).get("port")):
+                    folder.remove()
 
 
 def _alive(port: Any) -> bool:

@@ -53,15 +53,13 @@ def _pointing(content: Content) -> dict[str, Any]:
 
 
 def encode_line(content: Content) -> str:
-    """Command line of pxi-encode that makes the document of the raster."""
+    """Command line of pxi-encode that makes the document of the file that was opened."""
     flags = [
         word for key, value in {"effort": 2, **(content.settings or {})}.items()
         for word in (f"--{key.replace('_', '-')}", str(value))
     ]  # fmt: skip
-    masks = f"{content.name}-masks"
-    return words.command(
-        ["pxi-encode", content.file, f"{content.name}.pxi", "--masks", masks, *flags]
-    )
+    masks = [] if content.pointing is None else ["--masks", f"{content.name}-masks"]
+    return words.command(["pxi-encode", content.file, f"{content.name}.pxi", *masks, *flags])
 
 
 def _editing(content: Content, numbers: Numbers, prefix: str) -> dict[str, Any]:
@@ -137,7 +135,7 @@ def _command(content: Content) -> str:
             flags = ["--script", f"{content.name}.json"]
             break
         flags += said
-    lines = [encode_line(content)] if content.pointing is not None else []
+    lines = [] if content.file.lower().endswith(".pxi") else [encode_line(content)]
     if flags:
         lines.append(words.command(["pxi-edit", name, "edited.pxi", *flags]))
     return "\n".join(lines)

@@ -20,7 +20,7 @@ import uvicorn
 from ..errors import InputError
 from ..io.files import read_bytes
 from ..limits import Limits
-from .autosave import Folder, broken_off
+from .autosave import Folder, broken_off, sweep
 from .content import opened
 from .guard import Guard
 from .jobs import Job
@@ -118,6 +118,7 @@ def started(options: Options, port: int) -> Session:
         PxiError: The file cannot be opened.
     """
     path = None if options.file is None else Path(options.file).absolute()
+    sweep(options.sessions)
     old = broken_off(options.sessions, None if path is None else str(path))
     data = None if path is None else read_bytes(path)
     folder = old or Folder.new(options.sessions)

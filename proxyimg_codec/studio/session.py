@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import secrets
+import threading
 from collections.abc import Awaitable, Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -36,7 +37,11 @@ T = TypeVar("T")
 SOON = 0.3
 """Seconds from a change until it is saved in the folder of the session."""
 
+LONG = 0.4
+"""Seconds after which pages are told of work that goes on."""
+
 QUEUE_MAX = 256
+"""Most events that a page has not taken."""
 
 
 class Session:
@@ -72,7 +77,7 @@ class Session:
         self._saved: Document | None = None
         self._written: Path | None = None
         self._listeners: set[asyncio.Queue[Event]] = set()
-        self._lock = asyncio.Lock()
+        self._lock, self._writing = asyncio.Lock(), threading.Lock()
         self._one = ThreadPoolExecutor(1, "pxi-change")
         self._many = ThreadPoolExecutor(2, "pxi-draw")
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -143,6 +148,7 @@ class Session:
 
     async def _change(self, job: Job, work: Change, version: int | None = None) -> None:
         self._running[job.number] = job
+        late = asyncio.get_running_loop().call_later(LONG, self.publish_state)
         try:
             async with self._lock:
                 if version is not None and version != self.version:
@@ -153,8 +159,9 @@ class Session:
                 self.content = content
                 self.version += 1
         finally:
+            late.cancel()
             del self._running[job.number]
-        self.publish_state()
+            self.publish_state()
 
     def _worked(self, work: Change, job: Job) -> Content:
         with heard(lambda amount: job.check()):
@@ -184,7 +191,6 @@ class Session:
                     logging.getLogger(__name__).exception("%s failed", kind)
                 told = failure(error)[1]
                 self.publish("job-end", facts | {"ok": False, "error": told, "result": None})
-                self.publish_state()
 
         self._keep(run())
         return job.number
@@ -309,7 +315,8 @@ class Session:
     def write(self) -> None:
         """Writes the content to the folder of the session."""
         path = None if self.path is None else str(self.path)
-        written(self.folder, self.content, {"path": path, "port": self._port})
+        with self._writing:
+            written(self.folder, self.content, {"path": path, "port": self._port})
 
     def recover(self) -> bool:
         """Takes the content from the folder of the session; returns whether there was one."""
@@ -329,7 +336,7 @@ class Session:
             if content is last or (last is None and content.stage == "empty"):
                 continue
             try:
-                await self.read(self.write)
+                await asyncio.to_thread(self.write)
                 last = content
             except PxiError as error:
                 self.publish("warning", {"message": f"autosave: {error}"})

@@ -110,6 +110,17 @@ def test_only_sessions_of_the_file_that_nobody_has_open_are_found(tmp_path):
         Folder.new(tmp_path / "file")
 
 
+def test_sessions_nobody_went_on_with_are_given_up_in_time(tmp_path):
+    for name in ("old", "new"):
+        Folder(tmp_path / name).write({"path": None, "port": 1}, {})
+    (tmp_path / "other").mkdir()
+    then = time.time() - 31 * 86400
+    os.utime(tmp_path / "old" / autosave.STATE, (then, then))
+    autosave.sweep(tmp_path)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["new", "other"]
+    autosave.sweep(tmp_path / "nothing")
+
+
 def test_saving_writes_the_target_and_replaces_nothing_by_accident(tmp_path, small_pxi):
     async def main():
         session = Session(Folder.new(tmp_path / "s"), Limits(), 1, tmp_path / "photo.png")
@@ -291,6 +302,7 @@ def test_layered_files_are_opened_with_their_layers(studio, small_pxi, tmp_path)
     state = made.post("/api/open?wait&name=a.ora", content=data, json=None)
     assert [v["name"] for v in state["layers"]] == ["back", "bar", "disc"]
     assert not state["saved"]
+    assert state["command"] == "pxi-encode a.ora a.pxi --effort 2"
 
 
 # The server as a process
