@@ -131,11 +131,11 @@ function offer(what, back) {
     if (edits.length) await edit(edits);
     offer(what, back);
   };
-  say(`${what} removed. Behind it:`, {
+  say(`${what} removed. Fill with:`, {
     actions: [
-      ["As encoded", () => renew([])],
-      ...(layerOf(back)?.can_complete ? [/** @type {[string, () => void]} */ (["Continue surroundings", () => renew([{ op: "complete", layer: back }])])] : []),
-      ["A picture\u2026", () => choose("image/*", async (file) => { const source = await lend(file); if (source) renew([{ op: "texture", layer: back, source }]); })],
+      ["What is stored", () => renew([])],
+      ...(layerOf(back)?.can_complete ? [/** @type {[string, () => void]} */ (["Surroundings", () => renew([{ op: "complete", layer: back }])])] : []),
+      ["Picture\u2026", () => choose("image/*", async (file) => { const source = await lend(file); if (source) renew([{ op: "texture", layer: back, source }]); })],
       ["Undo", () => { quiet(); act(() => post("/api/undo", { steps: store.state.at - at + 1 })); }],
     ],
   });

@@ -139,6 +139,7 @@ function setMode(/** @type {"edit"|"motion"} */ mode) {
   if (mode === store.mode || store.state.stage !== "editing") return;
   store.mode = mode;
   use("select");
+  actions.quiet();
   tab("properties");
   emit("mode");
 }
@@ -167,7 +168,7 @@ function bars() {
   modes.children[0].setAttribute("aria-pressed", String(store.mode === "edit"));
   modes.children[1].setAttribute("aria-pressed", String(store.mode === "motion"));
   properties.hidden = store.mode === "motion" && editing;
-  tip.textContent = state.stage === "empty" ? "" : stage.tools[tool]?.hint ?? "";
+  tip.textContent = state.stage === "empty" ? "" : store.mode === "motion" && tool === "select" ? "Choose what is to move, or nothing for everything but the back; then a preset" : stage.tools[tool]?.hint ?? "";
   stage.root.style.cursor = stage.tools[tool]?.cursor ?? "default";
   hints();
 }

@@ -1,7 +1,6 @@
 /** The layers as they are drawn now: what the server sent, and what is being dragged on top of it. */
 import { get, pixels } from "./server.js";
-import { attach } from "./arap.js";
-import { apply, inverse } from "./matrix.js";
+import { apply, inverse, product } from "./matrix.js";
 import { emit, layerOf, on, store } from "./store.js";
 
 /** @typedef {{nodes: Float32Array, bent: Float32Array, faces: number[], uvs: Float32Array, box: string, rest: Float32Array,
@@ -14,7 +13,7 @@ export const preview = new Map();
 /** Displacements of nodes at the moment that is played, by name of layer. @type {Map<string, Float32Array>} */
 export const sway = new Map();
 
-/** @type {Map<string, {data: Uint8ClampedArray, width: number, height: number, box: number[], scale: number}>} */
+/** @type {Map<string, {box: number[], scale: number}>} */
 const textures = new Map();
 /** @type {Map<string, Mesh>} */
 const meshes = new Map();
@@ -45,7 +44,7 @@ async function texture(layer, scale) {
   await once(`${layer.texture} ${scale}`, async () => {
     const got = await pixels(`/api/layers/${layer.index}/texture?scale=${scale}&key=${encodeURIComponent(layer.texture)}`);
     if (layerOf(layer.name)?.texture !== layer.texture) return;
-    textures.set(layer.texture, { ...got, scale });
+    textures.set(layer.texture, { box: got.box, scale });
     painter?.give(layer.texture, got);
     emit("drawn");
   });
@@ -98,6 +97,7 @@ export function load(scale) {
     const have = textures.get(layer.texture);
     if (!have) texture(layer, 1).catch(() => {});
     else if (have.scale < wanted && !layer.hidden && preview.size === 0) texture(layer, wanted).catch(() => {});
+    if (outline(layer.name) === undefined) outlineOf(layer.name).then(() => emit("drawn"), () => {});
     if (layer.bent && meshes.get(layer.name)?.key !== layer.mesh) meshOf(layer.name).then(() => emit("drawn"), () => {});
   }
 }
@@ -151,32 +151,25 @@ function bentMesh(mesh, [x, y, w, h], bent, moves) {
   return { key: mesh.key, positions, uvs: mesh.uvs, triangles: mesh.triangles };
 }
 
-/** Front layer that shows at a point of the canvas. @param {number} x @param {number} y @returns {string|null} */
+const pen = /** @type {CanvasRenderingContext2D|null} */ (typeof document === "undefined" ? null : document.createElement("canvas").getContext("2d"));
+/** @type {WeakMap<number[][][], Path2D>} */
+const shapes = new WeakMap();
+
+/** Front layer whose outline holds a point of the canvas. @param {number} x @param {number} y @returns {string|null} */
 export function hit(x, y) {
+  const [w, h] = store.state.size;
   for (const layer of [...store.state.layers].reverse()) {
     if (layer.hidden || store.locked.has(layer.name)) continue;
-    if (alpha(layer, x, y) > 80) return layer.name;
+    const paths = outline(layer.name);
+    if (!paths) {
+      if (paths === null && x >= 0 && y >= 0 && x <= w && y <= h) return layer.name;
+      continue;
+    }
+    if (!shapes.has(paths)) shapes.set(paths, new Path2D(pathData(paths)));
+    const [u, v] = apply(product(layer.matrix, inverse(matrixOf(layer.name))), x, y);
+    if (pen?.isPointInPath(/** @type {Path2D} */ (shapes.get(paths)), u, v)) return layer.name;
   }
   return null;
-}
-
-/** Alpha of a layer at a point of the canvas, 0..255. */
-function alpha(/** @type {any} */ layer, /** @type {number} */ x, /** @type {number} */ y) {
-  const texture = textures.get(layer.texture);
-  if (!texture) return 0;
-  let [u, v] = apply(inverse(matrixOf(layer.name)), x, y);
-  const mesh = meshes.get(layer.name);
-  if (layer.bent && mesh) {
-    const found = attach(mesh.bent, mesh.faces, u, v);
-    if (found.distance > 1) return 0;
-    const at = [0, 1, 2].map((i) => mesh.faces[3 * found.triangle + i]);
-    u = at.reduce((sum, n, i) => sum + found.weights[i] * mesh.nodes[2 * n], 0);
-    v = at.reduce((sum, n, i) => sum + found.weights[i] * mesh.nodes[2 * n + 1], 0);
-  }
-  const [bx, by, bw, bh] = texture.box;
-  const i = Math.floor(((u - bx) / bw) * texture.width), j = Math.floor(((v - by) / bh) * texture.height);
-  if (i < 0 || j < 0 || i >= texture.width || j >= texture.height) return 0;
-  return texture.data[4 * (j * texture.width + i) + 3];
 }
 
 /** Present outline of a layer as the server has it; null covers the canvas. @param {string} name @returns {Promise<number[][][]|null>} */

@@ -5,13 +5,16 @@ import { post } from "../server.js";
 import { on, store } from "../store.js";
 import { select } from "./properties.js";
 
-/** @type {[string, string, string, "picture"|"layers"|"clip"|"page"][]} */
+/** @type {[string, string, string, "picture"|"layers"|"clip"][]} */
 const KINDS = [
-  ["pxi", "PXI", "Layers, editable, with the history", "layers"], ["png", "PNG", "A picture at any size", "picture"], ["jpg", "JPEG", "A picture, small", "picture"],
-  ["webp", "WebP", "A picture, small, with transparency", "picture"], ["tif", "TIFF", "A picture for print", "picture"], ["ora", "ORA", "Layers for Krita, GIMP, MyPaint", "layers"],
-  ["svg", "SVG", "Outlines of the layers", "layers"], ["html", "HTML", "A page that shows it without a network", "page"], ["mp4", "MP4", "A clip", "clip"],
-  ["webm", "WebM", "A clip with transparency", "clip"], ["gif", "GIF", "A clip that plays everywhere", "clip"], ["webp-clip", "WebP clip", "A clip, small", "clip"], ["apng", "APNG", "A clip without loss", "clip"],
+  ["png", "PNG", "A picture at any size, without loss.", "picture"], ["jpg", "JPEG", "A picture at any size, small.", "picture"],
+  ["webp", "WebP", "A picture at any size, small, with transparency.", "picture"], ["tif", "TIFF", "A picture for print.", "picture"],
+  ["pxi", "PXI", "Layers, editable, with the history.", "layers"], ["ora", "ORA", "Layers for Krita, GIMP and MyPaint.", "layers"],
+  ["svg", "SVG", "Outlines of the layers.", "layers"], ["html", "HTML", "A page of its own that shows the picture without a network.", "layers"],
+  ["mp4", "MP4", "A clip.", "clip"], ["webm", "WebM", "A clip with transparency.", "clip"], ["gif", "GIF", "A clip that plays everywhere.", "clip"],
+  ["webp-clip", "WebP", "A clip, small, with transparency.", "clip"], ["apng", "APNG", "A clip without loss.", "clip"],
 ];
+const SORTS = { picture: "Picture", layers: "Layers and pages", clip: "Clip" };
 const chosen = { kind: "png", width: 0, quality: 90, fps: 24, baked: false, purged: false };
 
 export const root = h("div", { class: "popover export float", hidden: true, role: "region", "aria-label": "Export" });
@@ -30,11 +33,15 @@ function build() {
   if (root.hidden || store.state.stage !== "editing") { root.hidden = true; return; }
   const [kind, title, meaning, sort] = /** @type {any} */ (KINDS.find(([k]) => k === chosen.kind));
   const moves = store.state.timeline, [w, hh] = store.state.size;
-  const kinds = KINDS.map(([k, text, , s]) => button({ text, class: "kind", pressed: k === kind, disabled: s === "clip" && !moves, label: s === "clip" && !moves ? "Animate the picture first" : undefined, onclick: () => { chosen.kind = k; build(); } }));
+  const kinds = Object.entries(SORTS).flatMap(([name, heading]) => [h("h3", {}, heading), h("div", { class: "kinds", role: "group", "aria-label": heading },
+    ...KINDS.filter(([, , , s]) => s === name).map(([k, text, , s]) => button({
+      text, class: "kind", pressed: k === kind, disabled: s === "clip" && !moves, label: s === "clip" && !moves ? "Animate the picture first, and keep the motion" : undefined,
+      onclick: () => { chosen.kind = k; build(); },
+    })))]);
   const sized = sort === "picture" || sort === "clip";
   const widths = [[0, `${w} \u00d7 ${hh}`], ...[0.5, 2, 4].map((f) => [Math.round(w * f), `${Math.round(w * f)} \u00d7 ${Math.round(hh * f)}`])];
   root.replaceChildren(
-    h("h2", {}, "Export"), h("div", { class: "kinds", role: "group", "aria-label": "Kind of file" }, ...kinds), h("p", { class: "note" }, meaning),
+    h("h2", {}, "Export"), ...kinds, h("p", { class: "note" }, meaning),
     ...[
       sized && select("Size", widths.map(([v, text]) => [String(v), String(text)]), String(chosen.width), (v) => { chosen.width = Number(v); }),
       ["jpg", "webp", "mp4", "webm", "webp-clip"].includes(kind) && slider({ label: "Quality", min: 1, max: 100, value: chosen.quality, oninput: (v) => { chosen.quality = v; } }),

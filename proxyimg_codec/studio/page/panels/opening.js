@@ -75,7 +75,7 @@ addEventListener("dragover", (e) => {
   if (!e.dataTransfer?.types.includes("Files")) return;
   e.preventDefault();
   clearTimeout(leave);
-  leave = window.setTimeout(() => show(false), 400);
+  leave = window.setTimeout(() => show(false), 1000);
   show(true);
 });
 addEventListener("drop", (e) => {

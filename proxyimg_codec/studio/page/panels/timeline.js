@@ -30,7 +30,7 @@ function build() {
     nodes.push(label);
   }
   if (!draft.handles.length) {
-    const empty = s("text", { x: LEFT, y: TOP + 24, class: "empty-line" });
+    const empty = s("text", { x: LEFT + 8, y: TOP + 24, class: "empty-line" });
     empty.textContent = has() || draft.preset ? "Handles with keys show here: choose the diamond, click a layer, drag it at some moment." : "Choose a preset, or hold a layer with a handle and give it keys.";
     nodes.push(empty);
   }
