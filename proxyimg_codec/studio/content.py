@@ -147,6 +147,7 @@ class Content:
             pointing.raster.pixels, settings, masks=list(pointing.regions),
             blocks=pointing.raster.blocks, progress=reporting(job),
         )  # fmt: skip
+        job.check()
         # What is edited is what a reader of the file has.
         document = Document.parsed(to_bytes(picture), DEFAULT_LIMITS)
         return replace(self, document=document, settings=dict(asked), base=0, kept=0)

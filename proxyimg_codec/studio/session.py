@@ -166,6 +166,7 @@ class Session:
     def _worked(self, work: Change, job: Job) -> Content:
         with heard(lambda amount: job.check()):
             after = work(self.content, job)
+            job.check()
         self._facts = described(after, self._numbers, self._prefix)
         return after
 

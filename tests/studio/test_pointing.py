@@ -11,6 +11,7 @@ from PIL import Image
 import proxyimg_codec as pxi
 from proxyimg_codec.encoder.shapes.masks import Region
 from proxyimg_codec.io import raster
+from proxyimg_codec.studio.jobs import CancelledError, Job
 from proxyimg_codec.studio.pointing import Pointing
 from tests.support.pictures import disc, smooth
 
@@ -235,3 +236,17 @@ def test_hints_with_strokes_are_those_of_a_scribble(studio, picture):
 def test_a_name_that_is_free_is_found(picture):
     pointing = Pointing.of(raster.read(picture))
     assert [pointing._free("back"), pointing._free("cat")] == ["back 2", "cat"]
+
+
+def test_encoding_tells_how_far_it_is_and_ends_when_it_is_cancelled(pointed):
+    told = []
+    content = pointed.session.content
+    job = Job("encode", lambda job: told.append((job.stage, job.done, job.total)))
+    content.encoded({"effort": 1}, 1, job)
+    assert [("layers", 0, 1), ("hidden", 0, 3)] == [t for t in told if t[1] == 0][:2]
+    assert told[-1][0] == "texture"
+    assert told[-1][1] == told[-1][2]
+    for stage in ("layers", "hidden", "texture"):
+        job = Job("encode", lambda job, stage=stage: job.stage == stage and job.cancel())
+        with pytest.raises(CancelledError, match="encode: cancelled"):
+            content.encoded({"effort": 1}, 1, job)

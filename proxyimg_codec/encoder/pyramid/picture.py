@@ -95,11 +95,11 @@ def encode_picture(
     for k, each in softs.items():
         numbers[k] = {"behind": len(rasters), "matte": len(rasters) + 1}
         rasters += [each.behind, each.matte]
-    copies = [
-        None if own and k == 0
-        else copies_of(picture, cuts, settings, softs[k].samples if k in softs else None)
-        for k, (_, cuts) in enumerate(views)
-    ]  # fmt: skip
+    copies = []
+    for k, (_, cuts) in enumerate(views):
+        report("hidden", k, len(views))
+        soft = softs[k].samples if k in softs else None
+        copies.append(None if own and k == 0 else copies_of(picture, cuts, settings, soft))
 
     def picture_of(sources: Sequence[Planes]) -> Picture:
         alpha = sources[1] if shared > 1 else None
