@@ -24,6 +24,9 @@ from .pointing import Pointing
 PAST_MAX = 100
 """Most states of regions that can be undone."""
 
+FOUND = 4
+"""Most layers that are looked for in a raster that is opened."""
+
 SETTINGS = ("quality", "effort", "target_size", "target_bpp", "target_psnr", "tune", "texture",
             "background", "matte", "seed")  # fmt: skip
 """Settings of the encoder that a page may choose."""
@@ -98,9 +101,13 @@ class Content:
         past = (*self.past, self.pointed)[-PAST_MAX:]
         return replace(self, pointing=pointing, past=past, future=())
 
-    def with_found(self, pointing: Pointing) -> Content:
-        """Returns the content with the regions that were found first, which cannot be undone."""
-        return replace(self, pointing=pointing)
+    def first_found(self, jobs: int) -> Content:
+        """Returns the content with the regions that are found first, which cannot be undone.
+
+        Raises:
+            PxiError: As `Pointing.searched`.
+        """
+        return replace(self, pointing=self.pointed.searched(FOUND, jobs))
 
     def regions_undone(self) -> Content:
         """Returns the content with the regions before the last change.

@@ -14,7 +14,9 @@ from ..encoder.shapes.contours import trace
 from ..encoder.shapes.external_models.locate import first_here
 from ..encoder.shapes.find import PROMPTER, find_layers, with_objects
 from ..encoder.shapes.masks import NAME_MAX, Region, is_back, resolve, visible
-from ..encoder.shapes.prompts import Box, Point, Prompt
+from ..encoder.shapes.pointing import point_in, scene_in
+from ..encoder.shapes.pointing_scene import Scene
+from ..encoder.shapes.prompts import Box, Point, Prompt, checked
 from ..errors import UsageError
 from ..io.raster import Picture as Raster
 from ..io.samples import to_float
@@ -49,12 +51,14 @@ class Pointing:
         regions: Regions, of which the first is the back, or `rest`.
         hints: Hints by the name of their region.
         found: Whether a segmenter has looked for regions already.
+        scenes: Scene of the raster for the built-in prompter, when it was needed.
     """
 
     raster: Raster
     regions: tuple[Region, ...]
     hints: Mapping[str, Hints] = field(default_factory=dict)
     found: bool = False
+    scenes: list[Scene] = field(default_factory=list)
 
     @classmethod
     def of(cls, raster: Raster) -> Pointing:
@@ -75,7 +79,7 @@ class Pointing:
             PxiError: As `encoder.shapes.find.find_layers`.
         """
         regions = find_layers(self.raster.pixels, max_layers=max_layers, jobs=jobs)
-        return Pointing(self.raster, tuple(regions) or self.regions, {}, True)
+        return replace(self, regions=tuple(regions) or self.regions, hints={}, found=True)
 
     def pointed(self, name: str | None, hints: Hints, jobs: int) -> Pointing:
         """Returns regions of which one follows more hints; `name` None makes a new one.
@@ -106,8 +110,21 @@ class Pointing:
 
     def _prompted(self, prompt: Prompt, jobs: int) -> Region:
         """Region that a prompt finds, whatever regions there are."""
-        found = with_objects(self._floats(), [], [prompt], jobs=jobs)
-        return next(v for v in found if v.name == prompt.name)
+        if prompter() != PROMPTER:
+            found = with_objects(self._floats(), [], [prompt], jobs=jobs)
+            return next(v for v in found if v.name == prompt.name)
+        width, height = self.size
+        told = checked([prompt], height, width)
+        self.prepare(jobs)
+        return point_in(self.scenes[0], self._rgb(), told)[0]
+
+    def prepare(self, jobs: int) -> None:
+        """Makes the scene, if it is needed: most of the work, and the same for each click."""
+        if not self.scenes and prompter() == PROMPTER:
+            self.scenes.append(scene_in(self._rgb(), jobs))
+
+    def _rgb(self) -> NDArray[np.uint8]:
+        return np.rint(self._floats()[..., :3] * 255).astype(np.uint8)
 
     def split(self, name: str, hints: Hints, to: str | None, jobs: int) -> Pointing:
         """Returns regions with a new one just in front of another, made of a part of that.

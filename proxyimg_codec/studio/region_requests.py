@@ -14,14 +14,9 @@ from .session import Change
 Values = Mapping[str, Any]
 
 
-def searched(jobs: int, count: int, first: bool = False) -> Change:
-    """Change that finds regions anew, which can be undone unless it is the first of a raster."""
-
-    def work(content: Content, job: Job) -> Content:
-        found = content.pointed.searched(count, jobs)
-        return content.with_found(found) if first else content.with_regions(found)
-
-    return work
+def searched(jobs: int, count: int) -> Change:
+    """Change that finds regions anew."""
+    return lambda content, job: content.with_regions(content.pointed.searched(count, jobs))
 
 
 def changed(action: str, values: Values, jobs: int) -> Change:

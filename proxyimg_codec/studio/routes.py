@@ -166,7 +166,7 @@ class _Routes:
         if session.content.stage == "editing":
             session.mark_saved()
         else:
-            session.begin_change("find", searched(session.jobs, 4, first=True))
+            session.begin_find()
         session.publish_state()
         return self._state()
 
@@ -200,7 +200,7 @@ class _Routes:
         if session.content.pointing is None:
             session.mark_saved()
         else:
-            session.begin_change("find", searched(session.jobs, 4, first=True))
+            session.begin_find()
         session.publish_state()
         return self._state()
 

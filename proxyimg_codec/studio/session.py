@@ -7,6 +7,7 @@ moment in others. So the event loop never waits for work.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 import secrets
 import threading
@@ -29,6 +30,7 @@ from .failures import StaleError
 from .failures import described as failure
 from .jobs import Job
 from .kept import recovered, written
+from .pointing import Pointing
 
 Change = Callable[[Content, Job], Content]
 Event = tuple[str, Any]
@@ -88,10 +90,7 @@ class Session:
         self._keep(self._saving())
         pointing = self.content.pointing
         if self.content.stage == "pointing" and pointing is not None and not pointing.found:
-            jobs = self.jobs
-            self.begin_change(
-                "find", lambda content, job: content.with_found(content.pointed.searched(4, jobs))
-            )
+            self.begin_find()
 
     async def stop(self) -> None:
         """Cancels all work, and keeps what is not saved."""
@@ -206,6 +205,22 @@ class Session:
             return result(self.content)
 
         return self.begin(kind, run)
+
+    def begin_find(self) -> None:
+        """Begins to find the regions of a raster that was just opened."""
+
+        async def run(job: Job) -> None:
+            await self._change(job, lambda content, job: content.first_found(self.jobs))
+            pointing = self.content.pointing
+            if pointing is not None:
+                self._keep(self._prepared(pointing))
+
+        self.begin("find", run)
+
+    async def _prepared(self, pointing: Pointing) -> None:
+        """Makes ready what the first click needs; it says itself why it fails."""
+        with contextlib.suppress(PxiError):
+            await self.read(lambda: pointing.prepare(self.jobs))
 
     async def read(self, work: Callable[[], T], job: Job | None = None) -> T:
         """Runs work that changes nothing in a thread.
