@@ -1,5 +1,7 @@
 """All that a newcomer does with the studio, by mouse and keyboard in a real browser."""
 
+import json
+
 import numpy as np
 import pytest
 from PIL import Image
@@ -72,6 +74,7 @@ def test_from_a_dropped_photograph_to_a_saved_file(photo, tmp_path):
         studio.shoot("4-encoding")
         studio.until("studio.store.state.stage === 'editing'")
         page.click("#got-it")
+        studio.until("studio.ready()")
 
         # Pulled, bent, undone, redone.
         studio.click(*RED)
@@ -91,7 +94,7 @@ def test_from_a_dropped_photograph_to_a_saved_file(photo, tmp_path):
         with page.expect_download() as download:
             page.click("#save")
         saved = download.value.path().read_bytes()
-        state = studio.state
+        state = json.loads(studio.ask("fetch('/api/state').then((answer) => answer.text())"))
 
     image = pxi.from_bytes(saved)
     assert [layer.name for layer in image.layers] == ["back", "red parrot"]
@@ -104,6 +107,7 @@ def test_tools_of_the_canvas(layered, tmp_path):
     with served(tmp_path / "kept", str(layered)) as address, opened(address, tmp_path) as studio:
         page = studio.page
         page.click("#got-it")
+        studio.until("studio.ready()")
         studio.click(*RED)
         assert studio.ask("[...studio.store.selected]") == ["red"]
         assert "red" in page.locator(".layer.on").inner_text()
@@ -193,6 +197,7 @@ def test_layers_in_the_list(layered, tmp_path):
     with served(tmp_path / "kept", str(layered)) as address, opened(address, tmp_path) as studio:
         page = studio.page
         page.click("#got-it")
+        studio.until("studio.ready()")
 
         def layers():
             return [layer["name"] for layer in studio.state["layers"]]
@@ -249,9 +254,12 @@ def test_motion(layered, tmp_path):
     with served(tmp_path / "kept", str(layered)) as address, opened(address, tmp_path) as studio:
         page = studio.page
         page.click("#got-it")
+        studio.until("studio.ready()")
         page.click("#mode-motion")
         page.get_by_role("button", name="Sway").click()
         studio.until("studio.player.running && studio.player.time > 0.2")
+        studio.press(" ")
+        studio.until("!studio.player.running")
         studio.shoot("14-motion")
         page.get_by_role("button", name="Left", exact=True).click()
         page.click("#tool-keep")
@@ -284,16 +292,18 @@ def test_motion(layered, tmp_path):
         studio.shoot("16-export")
         with page.expect_download() as download:
             page.click("#do-export")
-        assert Image.open(download.value.path()).n_frames > 20
+        with Image.open(download.value.path()) as clip:
+            assert clip.n_frames > 20
 
 
-def test_small_window_without_webgl(layered, tmp_path):
+def test_small_window_drawn_by_webgl(layered, tmp_path):
     with (
         served(tmp_path / "kept", str(layered)) as address,
-        opened(address, tmp_path, size=(900, 600), query="?flat") as studio,
+        opened(address, tmp_path, size=(900, 600), query="?draw=gl") as studio,
     ):
         studio.shoot("17-small")
         studio.page.click("#got-it")
+        studio.until("studio.ready()")
         studio.click(*RED)
         studio.page.wait_for_selector(".overlay .handle")
         studio.shoot("18-small-chosen")

@@ -10,6 +10,7 @@ import { ACCEPT } from "./panels/opening.js";
 import { encoding } from "./panels/pointing.js";
 import { root as properties } from "./panels/properties.js";
 import { root as timeline } from "./panels/timeline.js";
+import { ready } from "./scene.js";
 import { listen } from "./server.js";
 import * as stage from "./stage.js";
 import { arrived, emit, on, select, store, targets, use } from "./store.js";
@@ -244,4 +245,4 @@ on("state", (old) => {
 });
 
 /** For measuring: see tests/studio. */
-Object.assign(window, { studio: { times: stage.times, view: stage.view, store, player: motion.player } });
+Object.assign(window, { studio: { times: stage.times, view: stage.view, store, player: motion.player, ready } });

@@ -414,7 +414,7 @@ export class Puppet {
     }));
     this.component = components(count, triangles);
     this.grabbed = held.map(({ triangle }) => this.component[triangles[3 * triangle]]);
-    /** @type {{inside: number[], mine: number[], body: Body | null}[]} */
+    /** @type {{inside: number[], mine: number[], body: Body | null, last?: Float64Array}[]} */
     this.parts = [];
     for (const c of [...new Set(this.grabbed)].sort((a, b) => a - b)) {
       const mine = this.grabbed.flatMap((g, h) => (g === c ? [h] : []));
@@ -438,14 +438,16 @@ export class Puppet {
   /**
    * Positions of all nodes [2 N] when the held points are at their targets.
    * @param {ArrayLike<number>} targets [2 H]
-   * @param {{rounds?: number, milliseconds?: number}} budget less than all of both gives a sketch
+   * @param {{rounds?: number, milliseconds?: number, warm?: boolean}} budget less than all gives a sketch; `warm` goes
+   *   on from the last one, which is near where the pointer has moved only a little
    */
-  drag(targets, { rounds = ROUNDS, milliseconds = Infinity } = {}) {
+  drag(targets, { rounds = ROUNDS, milliseconds = Infinity, warm = false } = {}) {
     const until = performance.now() + milliseconds;
     const { nodes, points, places } = this;
     const moved = Float64Array.from(nodes);
     const goal = places.map((p, k) => targets[k] - (points[k] - p));
-    for (const { inside, mine, body } of this.parts) {
+    for (const part of this.parts) {
+      const { inside, mine, body } = part;
       if (!body) {
         const [h] = mine, dx = goal[2 * h] - places[2 * h], dy = goal[2 * h + 1] - places[2 * h + 1];
         for (const n of inside) { moved[2 * n] += dx; moved[2 * n + 1] += dy; }
@@ -453,7 +455,8 @@ export class Puppet {
       }
       const pick = (/** @type {ArrayLike<number>} */ v, /** @type {number[]} */ at) => Float64Array.from(at.flatMap((k) => [v[2 * k], v[2 * k + 1]]));
       const aim = pick(goal, mine);
-      const z = body.settle(rigid(pick(places, mine), aim, pick(nodes, inside)), aim, rounds, until);
+      const start = (warm && part.last) || rigid(pick(places, mine), aim, pick(nodes, inside));
+      const z = (part.last = body.settle(start, aim, rounds, until));
       inside.forEach((n, i) => { moved[2 * n] = z[2 * i]; moved[2 * n + 1] = z[2 * i + 1]; });
     }
     if (this.parts.length) this.#follow(moved);

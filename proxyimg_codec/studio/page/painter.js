@@ -25,18 +25,22 @@ in vec2 place;
 uniform sampler2D image;
 uniform mat4 colour;
 uniform float opacity;
-uniform bool changed;
 out vec4 result;
 void main() {
+#ifdef BENT
+  if (place.x < 0.0 || place.y < 0.0 || place.x > 1.0 || place.y > 1.0) discard;
+#endif
   vec4 c = texture(image, place);
-  if (changed && c.a > 0.0) c.rgb = clamp((colour * vec4(c.rgb / c.a, 1.0)).rgb, 0.0, 1.0) * c.a;
+#ifdef CHANGED
+  if (c.a > 0.0) c.rgb = clamp((colour * vec4(c.rgb / c.a, 1.0)).rgb, 0.0, 1.0) * c.a;
+#endif
   result = c * opacity;
 }`;
 
 export class Painter {
   /** @param {HTMLCanvasElement} canvas */
   constructor(canvas) {
-    const gl = canvas.getContext("webgl2", { alpha: true, antialias: false, premultipliedAlpha: true, desynchronized: true });
+    const gl = canvas.getContext("webgl2", { alpha: true, antialias: false, premultipliedAlpha: true });
     if (!gl) throw new Error("no WebGL2");
     this.gl = gl;
     this.canvas = canvas;
@@ -48,8 +52,22 @@ export class Painter {
   }
 
   #prepare() {
+    const { gl } = this;
+    this.programs = [0, 1, 2, 3].map((kind) => this.#program((kind & 1 ? "#define BENT\n" : "") + (kind & 2 ? "#define CHANGED\n" : "")));
+    this.square = [gl.createBuffer(), gl.createBuffer()];
+    this.buffers = { at: gl.createBuffer(), uv: gl.createBuffer(), index: gl.createBuffer() };
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.square[0]);
+    gl.bufferData(gl.ARRAY_BUFFER, new Float32Array([0, 0, 1, 0, 0, 1, 1, 1]), gl.STATIC_DRAW);
+    gl.enableVertexAttribArray(0);
+    gl.enableVertexAttribArray(1);
+    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    gl.pixelStorei(gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL, true);
+  }
+
+  /** Program for a kind of layer, so that each costs only what it needs. @param {string} defines */
+  #program(defines) {
     const { gl } = this, program = /** @type {WebGLProgram} */ (gl.createProgram());
-    for (const [kind, source] of /** @type {[number, string][]} */ ([[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, FRAGMENT]])) {
+    for (const [kind, source] of /** @type {[number, string][]} */ ([[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, FRAGMENT.replace("es\n", `es\n${defines}`)]])) {
       const shader = /** @type {WebGLShader} */ (gl.createShader(kind));
       gl.shaderSource(shader, source);
       gl.compileShader(shader);
@@ -59,17 +77,7 @@ export class Painter {
     gl.bindAttribLocation(program, 1, "uv");
     gl.linkProgram(program);
     if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program) ?? "link");
-    gl.useProgram(program);
-    this.uniforms = Object.fromEntries(["row0", "row1", "colour", "opacity", "changed"].map((n) => [n, gl.getUniformLocation(program, n)]));
-    this.square = [gl.createBuffer(), gl.createBuffer()];
-    this.buffers = { at: gl.createBuffer(), uv: gl.createBuffer(), index: gl.createBuffer() };
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.square[0]);
-    gl.bufferData(gl.ARRAY_BUFFER, new Float32Array([0, 0, 1, 0, 0, 1, 1, 1]), gl.STATIC_DRAW);
-    gl.enableVertexAttribArray(0);
-    gl.enableVertexAttribArray(1);
-    gl.enable(gl.BLEND);
-    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-    gl.pixelStorei(gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL, true);
+    return { program, uniforms: Object.fromEntries(["row0", "row1", "colour", "opacity"].map((n) => [n, gl.getUniformLocation(program, n)])) };
   }
 
   /** @param {string} key */
@@ -101,7 +109,7 @@ export class Painter {
    * @param {number} ratio device pixels in a CSS pixel @param {number[]} size of the canvas
    */
   draw(items, view, ratio, size) {
-    const { gl, canvas, uniforms } = this;
+    const { gl, canvas } = this;
     gl.viewport(0, 0, canvas.width, canvas.height);
     gl.disable(gl.SCISSOR_TEST);
     gl.clearColor(0, 0, 0, 0);
@@ -116,6 +124,10 @@ export class Painter {
     for (const item of items) {
       const texture = this.textures.get(item.key);
       if (!texture || item.opacity <= 0) continue;
+      const { program, uniforms } = this.programs[(item.mesh ? 1 : 0) + (item.colour ? 2 : 0)];
+      gl.useProgram(program);
+      // The first one covers what is empty: nothing to mix it with.
+      if (this.calls) gl.enable(gl.BLEND); else gl.disable(gl.BLEND);
       gl.bindTexture(gl.TEXTURE_2D, texture.texture);
       gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, view.scale * ratio > 8 ? gl.NEAREST : gl.LINEAR);
       let [a, b, c, d, e, f] = item.matrix;
@@ -126,7 +138,6 @@ export class Painter {
       gl.uniform3f(uniforms.row0, a * sx, c * sx, e * sx + tx);
       gl.uniform3f(uniforms.row1, b * sy, d * sy, f * sy + ty);
       gl.uniform1f(uniforms.opacity, item.opacity);
-      gl.uniform1i(uniforms.changed, item.colour ? 1 : 0);
       if (item.colour) {
         const m = item.colour;
         gl.uniformMatrix4fv(uniforms.colour, false, [m[0], m[4], m[8], 0, m[1], m[5], m[9], 0, m[2], m[6], m[10], 0, m[3], m[7], m[11], 1]);
@@ -157,7 +168,16 @@ export class Painter {
   }
 }
 
-/** The same with a 2-D canvas, where there is no WebGL2. Colour changes show when the exact picture comes. */
+/** Whether there is a graphics card: software that plays one is slower than a 2-D canvas. */
+export function accelerated() {
+  const gl = document.createElement("canvas").getContext("webgl2", { failIfMajorPerformanceCaveat: true });
+  const info = gl?.getExtension("WEBGL_debug_renderer_info");
+  const name = gl ? String(gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER)) : "software";
+  gl?.getExtension("WEBGL_lose_context")?.loseContext();
+  return !/swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
+}
+
+/** The same with a 2-D canvas, where there is no graphics card. */
 export class FlatPainter {
   /** @param {HTMLCanvasElement} canvas */
   constructor(canvas) {
@@ -166,6 +186,8 @@ export class FlatPainter {
     this.calls = 0;
     /** @type {Map<string, HTMLCanvasElement>} */
     this.textures = new Map();
+    /** The last changed colours of each texture. @type {Map<string, {colour: string, sheet: HTMLCanvasElement}>} */
+    this.coloured = new Map();
   }
 
   /** @param {string} key */
@@ -174,12 +196,16 @@ export class FlatPainter {
   /** @param {string} key @param {{width: number, height: number, data: Uint8ClampedArray}} pixels */
   give(key, { width, height, data }) {
     const sheet = Object.assign(document.createElement("canvas"), { width, height });
-    sheet.getContext("2d")?.putImageData(new ImageData(/** @type {any} */ (data), width, height), 0, 0);
+    sheet.getContext("2d", { willReadFrequently: true })?.putImageData(new ImageData(/** @type {any} */ (data), width, height), 0, 0);
+    this.drop(key);
     this.textures.set(key, sheet);
   }
 
   /** @param {string} key */
-  drop(key) { this.textures.delete(key); }
+  drop(key) {
+    this.textures.delete(key);
+    this.coloured.delete(key);
+  }
 
   /** @param {Item[]} items @param {import("./viewport.js").Viewport} view @param {number} ratio @param {number[]} size */
   draw(items, view, ratio, size) {
@@ -194,7 +220,7 @@ export class FlatPainter {
     const base = c.getTransform();
     this.calls = 0;
     for (const item of items) {
-      const sheet = this.textures.get(item.key);
+      const sheet = this.#sheet(item);
       if (!sheet) continue;
       c.globalAlpha = item.opacity;
       c.setTransform(base.multiply(new DOMMatrix(item.matrix)));
@@ -205,27 +231,49 @@ export class FlatPainter {
     c.restore();
   }
 
+  /** Texture of an item in its colours. @param {Item} item */
+  #sheet({ key, colour: m }) {
+    const sheet = this.textures.get(key), name = String(m);
+    if (!m || !sheet) return sheet;
+    const last = this.coloured.get(key);
+    if (last?.colour === name) return last.sheet;
+    const { width, height } = sheet, made = Object.assign(document.createElement("canvas"), { width, height });
+    const image = sheet.getContext("2d")?.getImageData(0, 0, width, height), d = image?.data ?? [];
+    for (let i = 0; i < d.length; i += 4) {
+      const r = d[i], g = d[i + 1], b = d[i + 2];
+      for (let k = 0; k < 3; k++) d[i + k] = m[4 * k] * r + m[4 * k + 1] * g + m[4 * k + 2] * b + 255 * m[4 * k + 3];
+    }
+    if (image) made.getContext("2d")?.putImageData(image, 0, 0);
+    this.coloured.set(key, { colour: name, sheet: made });
+    return made;
+  }
+
+  /** Fills triangle after triangle, each a little larger so that no seams show. */
   #bent(sheet, { positions, uvs, triangles }) {
-    const { context: c } = this, base = c.getTransform();
+    const { context: c } = this, { width, height } = sheet, grow = 0.4;
+    const pattern = /** @type {CanvasPattern} */ (c.createPattern(sheet, "no-repeat")), place = new DOMMatrix();
+    c.fillStyle = pattern;
     for (let t = 0; t < triangles.length; t += 3) {
-      const [i, j, k] = [2 * triangles[t], 2 * triangles[t + 1], 2 * triangles[t + 2]];
-      const u = [i, j, k].map((n) => [uvs[n] * sheet.width, uvs[n + 1] * sheet.height]);
-      const p = [i, j, k].map((n) => [positions[n], positions[n + 1]]);
-      const det = (u[1][0] - u[0][0]) * (u[2][1] - u[0][1]) - (u[2][0] - u[0][0]) * (u[1][1] - u[0][1]);
+      const i = 2 * triangles[t], j = 2 * triangles[t + 1], k = 2 * triangles[t + 2];
+      const u0 = uvs[i] * width, v0 = uvs[i + 1] * height;
+      const ux = uvs[j] * width - u0, uy = uvs[j + 1] * height - v0, vx = uvs[k] * width - u0, vy = uvs[k + 1] * height - v0;
+      const det = ux * vy - vx * uy;
       if (!det) continue;
-      const across = (axis) => [
-        ((p[1][axis] - p[0][axis]) * (u[2][1] - u[0][1]) - (p[2][axis] - p[0][axis]) * (u[1][1] - u[0][1])) / det,
-        ((p[2][axis] - p[0][axis]) * (u[1][0] - u[0][0]) - (p[1][axis] - p[0][axis]) * (u[2][0] - u[0][0])) / det,
-      ];
-      const [a, cc] = across(0), [b, d] = across(1);
-      c.save();
-      c.setTransform(base);
+      const x = positions[i], y = positions[i + 1], px = positions[j] - x, py = positions[j + 1] - y, qx = positions[k] - x, qy = positions[k + 1] - y;
+      place.a = (px * vy - qx * uy) / det;
+      place.b = (py * vy - qy * uy) / det;
+      place.c = (qx * ux - px * vx) / det;
+      place.d = (qy * ux - py * vx) / det;
+      place.e = x - place.a * u0 - place.c * v0;
+      place.f = y - place.b * u0 - place.d * v0;
+      pattern.setTransform(place);
+      const mx = x + (px + qx) / 3, my = y + (py + qy) / 3;
       c.beginPath();
-      p.forEach(([x, y], n) => (n ? c.lineTo(x, y) : c.moveTo(x, y)));
-      c.clip();
-      c.transform(a, b, cc, d, p[0][0] - a * u[0][0] - cc * u[0][1], p[0][1] - b * u[0][0] - d * u[0][1]);
-      c.drawImage(sheet, 0, 0);
-      c.restore();
+      for (const n of [i, j, k]) {
+        const dx = positions[n] - mx, dy = positions[n + 1] - my, f = 1 + grow / (Math.abs(dx) + Math.abs(dy) + 1e-6);
+        if (n === i) c.moveTo(mx + f * dx, my + f * dy); else c.lineTo(mx + f * dx, my + f * dy);
+      }
+      c.fill();
     }
   }
 }

@@ -102,9 +102,9 @@ export function load(scale) {
   }
 }
 
-/** Whether every layer that shows can be drawn. */
+/** Whether every layer can be drawn and pointed at. */
 export function ready() {
-  return store.state.layers.every((/** @type {any} */ l) => l.hidden || (painter?.has(l.texture) && (!l.bent || meshes.get(l.name)?.key === l.mesh)));
+  return store.state.layers.every((/** @type {any} */ l) => outline(l.name) !== undefined && painter?.has(l.texture) && (!l.bent || meshes.get(l.name)?.key === l.mesh));
 }
 
 /** @param {string} name */

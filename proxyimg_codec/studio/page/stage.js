@@ -1,6 +1,6 @@
 /** The canvas in the middle: draws, zooms, pans, and hands the pointer to the tool in use. */
 import { h, later, s } from "./dom.js";
-import { FlatPainter, Painter } from "./painter.js";
+import { FlatPainter, Painter, accelerated } from "./painter.js";
 import * as scene from "./scene.js";
 import { pixels } from "./server.js";
 import { emit, hover, on, store } from "./store.js";
@@ -9,7 +9,7 @@ import { Viewport } from "./viewport.js";
 export const view = new Viewport();
 
 /** Milliseconds between frames, from the pointer to the picture, and from rest to the exact picture: the last ones. */
-export const times = { frames: /** @type {number[]} */ ([]), pointer: /** @type {number[]} */ ([]), exact: /** @type {number[]} */ ([]), calls: 0 };
+export const times = { frames: /** @type {number[]} */ ([]), pointer: /** @type {number[]} */ ([]), exact: /** @type {number[]} */ ([]), calls: 0, drawn: 0 };
 
 /** @typedef {{id: string, label: string, icon: string, keys: string, hint: string, cursor?: string,
  *   down?: (p: Place, e: PointerEvent) => void, drag?: (p: Place, e: PointerEvent) => void, up?: (p: Place, e: PointerEvent) => void,
@@ -27,10 +27,10 @@ const overlay = s("svg", { class: "overlay", "aria-hidden": "true" });
 export const root = h("div", { class: "stage", tabIndex: 0, role: "application", "aria-label": "Canvas. Arrow keys nudge what is selected; plus and minus zoom." }, paper, sheet, exact, overlay);
 
 const ratio = () => Math.min(window.devicePixelRatio || 1, 3);
-const flat = new URLSearchParams(location.search).has("flat");
+/** How to draw, if the address says so: `?draw=gl` or `?draw=flat`. */
+const wanted = new URLSearchParams(location.search).get("draw");
 /** @type {any} */
-let painter;
-try { if (flat) throw new Error("asked for"); painter = new Painter(sheet); } catch { painter = new FlatPainter(sheet); }
+const painter = (wanted ? wanted === "gl" : accelerated()) ? new Painter(sheet) : new FlatPainter(sheet);
 scene.paintWith(painter);
 
 let asked = false, lastFrame = 0, pointerAt = 0;
@@ -52,6 +52,7 @@ function frame(now) {
   const list = state.stage === "editing" ? scene.items(skins()) : state.stage === "pointing" ? sourceItems() : [];
   if (state.stage !== "empty") painter.draw(list, view, ratio(), state.size);
   times.calls = painter.calls;
+  times.drawn++;
   if (!exact.hidden && (scene.changed() || key() !== shownKey)) exact.hidden = true;
   paintOverlay();
   if (pointerAt) {

@@ -20,7 +20,7 @@ export const chosen = { pin: -1, mesh: true };
 /** Points around a pin that turn with it. */
 const RING = 6;
 /** Milliseconds that the solution may take while the pointer moves. */
-const BUDGET = 28;
+const BUDGET = 12;
 
 const own = () => { const layer = single(); return layer ? (pins.get(layer.name) ?? pins.set(layer.name, []).get(layer.name)) : []; };
 
@@ -64,7 +64,7 @@ let waiting = false;
 function solve(full = false) {
   if (!work) return;
   const { puppet, targets, name } = work;
-  const z = puppet.drag(targets, full ? {} : { milliseconds: BUDGET, rounds: 4 });
+  const z = puppet.drag(targets, full ? {} : { milliseconds: BUDGET, rounds: 2, warm: true });
   const back = inverse(scene.matrixOf(name)), bent = new Float32Array(z.length);
   for (let i = 0; i < z.length; i += 2) [bent[i], bent[i + 1]] = apply(back, z[i], z[i + 1]);
   scene.preview.set(name, { ...scene.preview.get(name), bent });
@@ -214,7 +214,7 @@ tools.pins = {
     if (chosen.mesh) {
       const nodes = scene.present(layer.name, mesh), d = [];
       const q = (/** @type {number} */ n) => view.toScreen(nodes[2 * n], nodes[2 * n + 1]).map((v) => v.toFixed(1)).join(" ");
-      for (let t = 0; t < mesh.faces.length; t += 3) d.push(`M${q(mesh.faces[t])}L${q(mesh.faces[t + 1])}L${q(mesh.faces[t + 2])}Z`);
+      for (const [a, b] of edges(mesh)) d.push(`M${q(a)}L${q(b)}`);
       add(s("path", { d: d.join(""), class: "mesh" }));
     }
     own().forEach((pin, i) => {
@@ -229,6 +229,21 @@ tools.pins = {
     });
   },
 };
+
+/** @type {WeakMap<object, number[][]>} */
+const known = new WeakMap();
+
+/** Edges of a mesh, each once. @param {import("../scene.js").Mesh} mesh @returns {number[][]} */
+function edges(mesh) {
+  const found = known.get(mesh) ?? [], seen = new Set();
+  if (known.has(mesh)) return found;
+  for (let t = 0; t < mesh.faces.length; t += 3) for (let i = 0; i < 3; i++) {
+    const a = mesh.faces[t + i], b = mesh.faces[t + ((i + 1) % 3)], key = Math.min(a, b) * 1e6 + Math.max(a, b);
+    if (!seen.has(key)) { seen.add(key); found.push([a, b]); }
+  }
+  known.set(mesh, found);
+  return found;
+}
 
 function attachDistance(/** @type {string} */ name, /** @type {any} */ p) {
   const mesh = scene.mesh(name);
