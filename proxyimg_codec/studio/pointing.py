@@ -72,6 +72,11 @@ class Pointing:
         height, width = self.raster.pixels.shape[:2]
         return width, height
 
+    @property
+    def opaque(self) -> bool:
+        """Whether the first region is the back, which covers what no other has."""
+        return bool((self._floats()[..., 3] == 1).all())
+
     def searched(self, max_layers: int, jobs: int) -> Pointing:
         """Returns the regions that the built-in segmenter finds.
 
@@ -207,20 +212,22 @@ class Pointing:
         Raises:
             UsageError: There is no such region or position.
         """
-        region = self._object(name)
+        region, first = self._object(name), int(self.opaque)
         rest = [v for v in self.regions if v is not region]
-        if not 1 <= to <= len(rest):
-            raise UsageError(f"to: {to} is not within 1..{len(rest)}")
+        if not first <= to <= len(rest):
+            raise UsageError(f"to: {to} is not within {first}..{len(rest)}")
         rest.insert(to, region)
-        return self._stacked(rest)
+        return self._stacked(rest, kept=name)
 
     def described(self) -> list[dict[str, Any]]:
         """Regions as JSON values, see `README.md`."""
         seen = visible(self.regions)
-        return [
+        found = [
             _described(k, region, mask, self.hints.get(region.name))
             for k, (region, mask) in enumerate(zip(self.regions, seen, strict=True))
         ]
+        found[0]["back"] = self.opaque
+        return found
 
     def save_masks(self, folder: Path) -> None:
         """Writes the regions as the folder of masks that pxi-encode takes."""
@@ -247,8 +254,7 @@ class Pointing:
             kept: Name of a region that stays, whatever there is to see of it.
         """
         width, height = self.size
-        alpha = self._floats()[..., 3]
-        support = None if (alpha == 1).all() else alpha >= 0.5
+        support = None if self.opaque else self._floats()[..., 3] >= 0.5
         seen = zip(regions, visible(regions), strict=True)
         there = [
             v for k, (v, mask) in enumerate(seen)
@@ -271,7 +277,7 @@ class Pointing:
 
     def _object(self, name: Any) -> Region:
         found = self._region(name)
-        if found is self.regions[0]:
+        if found is self.regions[0] and self.opaque:
             raise UsageError(f'"{name}" is the back, which stays behind all')
         return found
 
@@ -306,7 +312,7 @@ def _described(k: int, region: Region, mask: Mask, hints: Hints | None) -> dict[
     rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
     told = hints or Hints()
     return {
-        "index": k, "name": region.name, "back": k == 0, "area": int(mask.sum()),
+        "index": k, "name": region.name, "back": False, "area": int(mask.sum()),
         "bounds": [int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1],
         "outline": [_smoothed(loop) for loop in trace(mask, SPECK)],
         "prompt": {"inside": told.inside, "outside": told.outside, "box": told.box},

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from ..errors import UnsupportedError
 
-DECODER = Path(__file__).resolve().parents[2] / "web" / "pxi"
-"""Decoder in JavaScript, in a checkout."""
+DECODERS = (Path(__file__).parent / "decoder", Path(__file__).resolve().parents[2] / "web" / "pxi")
+"""Folders of the decoder in JavaScript: that of a wheel, and that of a checkout."""
 
 MODEL = "pyramid-1.bin"
 
@@ -77,9 +77,12 @@ def page_of(title: str, picture: bytes) -> bytes:
     Raises:
         UnsupportedError: The decoder in JavaScript is not beside the package.
     """
-    modules = sorted(DECODER.glob("*.js"))
+    modules = next(filter(None, (sorted(place.glob("*.js")) for place in DECODERS)), [])
     if not modules:
-        raise UnsupportedError("this needs web/pxi of the source checkout, which is not here")
+        raise UnsupportedError(
+            "the decoder in JavaScript, which is to be in the page, is not installed; "
+            "install proxyimg-codec again"
+        )
     imports = {f"pxi/{m.name}": _module(m.read_text("utf-8")) for m in modules}
     model = resources.files("proxyimg_codec.models").joinpath(MODEL).read_bytes()
     page = _PAGE.format(

@@ -211,15 +211,27 @@ def test_settings_that_make_no_sense_are_refused(pointed, settings):
     assert pointed.settled()["stage"] == "pointing"
 
 
-def test_masks_of_all_shapes_can_be_regions(studio, tmp_path):
-    raster.write(
-        tmp_path / "clear.png", np.dstack([smooth(64, 48), 255 * disc(64, 48).astype("u1")])
-    )
+def test_a_transparent_picture_has_no_back(studio, tmp_path):
+    inside = disc(64, 48)
+    raster.write(tmp_path / "clear.png", np.dstack([smooth(64, 48), 255 * inside.astype("u1")]))
     made = studio()
     state = made.open(tmp_path / "clear.png")
-    assert state["regions"]
-    state = made.post("/api/regions/paint", {"name": names(state)[0], "strokes": [[[32, 24]]]})
-    assert state["stage"] == "pointing"
+    assert not any(v["back"] for v in state["regions"])
+    assert sum(v["area"] for v in state["regions"]) == inside.sum()
+    (only,) = names(state)
+    split = {"name": only, "inside": [[32, 20]], "outside": [[32, 34]], "to": "top"}
+    state = made.post("/api/regions/split", split)
+    assert names(state) == [only, "top"]
+    behind = {"name": "top", "to": 0}
+    assert "hidden by" in made.refused("input", "POST", "/api/regions/order", json=behind)
+    state = made.post("/api/regions/remove", {"name": only})
+    assert names(state) == ["rest", "top"]
+    state = made.post("/api/regions/order", behind)
+    assert names(state) == ["top", "rest"]
+    state = made.post("/api/regions/remove", {"name": "top"})
+    assert sum(v["area"] for v in state["regions"]) == inside.sum()
+    answer = made.post("/api/encode?wait", {"effort": 1})
+    assert not answer["opaque"]
 
 
 def test_hints_with_strokes_are_those_of_a_scribble(studio, picture):
