@@ -25,7 +25,7 @@ export function act(work) {
       return answer;
     } catch (error) {
       if (error instanceof Refused && error.kind === "cancelled") say("Cancelled.");
-      else { console.warn(error); say(/** @type {Error} */ (error).message, { kind: "error" }); }
+      else { console.warn(error); say(/** @type {Error} */ (error).message.replace(/^edit 1: /, ""), { kind: "error" }); }
       return null;
     }
   });

@@ -18,6 +18,9 @@ const FOLDING = 0.02, SQUEEZED = 0.25;
  * distances of nodes from one end of it, which keeps what is stored close to the diagonal.
  */
 class Skyline {
+  /** @type {Float64Array|undefined} */
+  work;
+
   /** @param {number} count @param {ArrayLike<number>[]} elements flat triples; the first connects all */
   constructor(count, elements) {
     const from = levels(count, elements[0], 0);

@@ -25,7 +25,7 @@ function build() {
   const end = seconds(), step = [0.1, 0.25, 0.5, 1, 2, 5].find((v) => (v / end) * width() > 46) ?? 10, nodes = [];
   for (let t = 0; t <= end + 1e-6; t += step) {
     nodes.push(s("line", { x1: x(t), x2: x(t), y1: 13, y2: 18, class: "tick" }));
-    const label = s("text", { x: x(t), y: 9, class: "label", "text-anchor": t === 0 ? "start" : t > end - step / 2 ? "end" : "middle" });
+    const label = s("text", { x: x(t) + (t === 0 ? 9 : 0), y: 9, class: "label", "text-anchor": t === 0 ? "start" : t > end - step / 2 ? "end" : "middle" });
     label.textContent = `${Number(t.toFixed(2))}s`;
     nodes.push(label);
   }

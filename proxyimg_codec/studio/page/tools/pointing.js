@@ -21,14 +21,25 @@ const current = () => { const region = store.selected.size === 1 ? regionOf([...
 let cache = { version: -1, shapes: [] };
 const pen = /** @type {CanvasRenderingContext2D} */ (document.createElement("canvas").getContext("2d"));
 
+/** Points of a polygon along the borders of pixels, with its corners cut so that stairs become slopes. @param {number[]} flat */
+function rounded(flat) {
+  const n = flat.length, out = [];
+  for (let i = 0; i < n; i += 2) {
+    const x = flat[i], y = flat[i + 1];
+    for (const j of [(i + n - 2) % n, (i + 2) % n]) {
+      const dx = flat[j] - x, dy = flat[j + 1] - y, part = Math.min(0.5, 1 / (Math.hypot(dx, dy) || 1));
+      out.push(`${(x + part * dx).toFixed(2)} ${(y + part * dy).toFixed(2)}`);
+    }
+  }
+  return out;
+}
+
 function shapes() {
   const { state } = store;
   if (cache.version !== state.version) {
     cache = { version: state.version, shapes: (state.regions ?? []).map((/** @type {any} */ region) => {
       const d = region.outline.map((/** @type {number[][]|number[]} */ ring) => {
-        const flat = /** @type {any} */ (ring).flat(), parts = [];
-        for (let i = 0; i < flat.length; i += 2) parts.push(`${flat[i]} ${flat[i + 1]}`);
-        return `M${parts.join("L")}Z`;
+        return `M${rounded(/** @type {any} */ (ring).flat()).join("L")}Z`;
       }).join("");
       return { region, d, path: new Path2D(d) };
     }) };
