@@ -46,6 +46,7 @@ class Folder:
     """
 
     def __init__(self, path: Path) -> None:
+        path = path.absolute()  # edits are done in another folder
         self.path, self.files, self.exports = path, path / "files", path / "exports"
         self.held: object = None
         try:

@@ -72,6 +72,11 @@ class Content:
         """Name of the picture without suffix."""
         return PurePath(self.file).stem or "picture"
 
+    def is_new(self, before: Content) -> bool:
+        """Whether this has a raster that another content does not have."""
+        there = None if before.pointing is None else before.pointing.raster
+        return self.pointing is not None and self.pointing.raster is not there
+
     @property
     def edited(self) -> Document:
         """The document.

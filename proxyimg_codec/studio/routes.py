@@ -165,9 +165,6 @@ class _Routes:
         await session.change("open", work)
         if session.content.stage == "editing":
             session.mark_saved()
-        else:
-            session.begin_find()
-        session.publish_state()
         return self._state()
 
     async def add_file(self, request: Request) -> Response:
@@ -197,11 +194,8 @@ class _Routes:
             return replace(found, path=str(path))
 
         await session.change("open", work)
-        if session.content.pointing is None:
+        if path.suffix.lower() == ".pxi":
             session.mark_saved()
-        else:
-            session.begin_find()
-        session.publish_state()
         return self._state()
 
     async def source(self, request: Request) -> Response:

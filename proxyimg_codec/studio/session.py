@@ -79,7 +79,7 @@ class Session:
         self._saved: Document | None = None
         self._written: Path | None = None
         self._listeners: set[asyncio.Queue[Event]] = set()
-        self._lock, self._writing = asyncio.Lock(), threading.Lock()
+        self._lock, self._writing, self._closed = asyncio.Lock(), threading.Lock(), False
         self._one = ThreadPoolExecutor(1, "pxi-change")
         self._many = ThreadPoolExecutor(2, "pxi-draw")
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -101,10 +101,16 @@ class Session:
         await asyncio.gather(*self._tasks, return_exceptions=True)
         await asyncio.to_thread(self._one.shutdown)
         await asyncio.to_thread(self._many.shutdown)
-        if self.saved:
-            self.folder.remove()
-        else:
+        await asyncio.to_thread(self._close)
+
+    def _close(self) -> None:
+        """Keeps what is not saved, or removes the folder; nothing is written after that."""
+        if not self.saved:
             self.write()
+        with self._writing:
+            self._closed = True
+            if self.saved:
+                self.folder.remove()
 
     @property
     def target(self) -> Path | None:
@@ -154,13 +160,15 @@ class Session:
                     raise StaleError(
                         f"the state is {self.version} by now, not {version}; ask for it again"
                     )
-                content = await self._in(self._one, lambda: self._worked(work, job))
-                self.content = content
+                before = self.content
+                self.content = await self._in(self._one, lambda: self._worked(work, job))
                 self.version += 1
         finally:
             late.cancel()
             del self._running[job.number]
             self.publish_state()
+        if self.content.stage == "pointing" and self.content.is_new(before):
+            self.begin_find()
 
     def _worked(self, work: Change, job: Job) -> Content:
         with heard(lambda amount: job.check()):
@@ -207,7 +215,7 @@ class Session:
         return self.begin(kind, run)
 
     def begin_find(self) -> None:
-        """Begins to find the regions of a raster that was just opened."""
+        """Begins to find the regions of a raster that was opened."""
 
         async def run(job: Job) -> None:
             await self._change(job, lambda content, job: content.first_found(self.jobs))
@@ -327,12 +335,14 @@ class Session:
     def mark_saved(self) -> None:
         """Notes that the file on disk has the present document: it was read from there."""
         self._saved = self.content.document
+        self.publish_state()
 
     def write(self) -> None:
         """Writes the content to the folder of the session."""
         path = None if self.path is None else str(self.path)
         with self._writing:
-            written(self.folder, self.content, {"path": path, "port": self._port})
+            if not self._closed:
+                written(self.folder, self.content, {"path": path, "port": self._port})
 
     def recover(self) -> bool:
         """Takes the content from the folder of the session; returns whether there was one."""

@@ -5,10 +5,7 @@ import contextlib
 import pytest
 
 from proxyimg_codec.limits import Limits
-from proxyimg_codec.studio.autosave import Folder
 from proxyimg_codec.studio.guard import TOKEN_HEADER, Guard
-from proxyimg_codec.studio.server import composed
-from proxyimg_codec.studio.session import Session
 
 PORT, TOKEN = 8765, "a-token-of-tests"
 
@@ -56,6 +53,10 @@ class Studio:
 def studio(tmp_path, plain_maps):
     """Makes studios: studio(limits=...) -> `Studio`, which ends with the test."""
     from starlette.testclient import TestClient
+
+    from proxyimg_codec.studio.autosave import Folder
+    from proxyimg_codec.studio.server import composed
+    from proxyimg_codec.studio.session import Session
 
     with contextlib.ExitStack() as stack:
 

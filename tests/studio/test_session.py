@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import proxyimg_codec as pxi
 from proxyimg_codec.errors import InputError
@@ -303,6 +304,36 @@ def test_layered_files_are_opened_with_their_layers(studio, small_pxi, tmp_path)
     assert [v["name"] for v in state["layers"]] == ["back", "bar", "disc"]
     assert not state["saved"]
     assert state["command"] == "pxi-encode a.ora a.pxi --effort 2"
+
+
+def test_photoshop_files_are_opened_with_their_layers(studio, tmp_path):
+    psd_tools = pytest.importorskip("psd_tools")
+    layered = psd_tools.PSDImage.new("RGB", (40, 30))
+    layered.create_pixel_layer_from_array(smooth(40, 30), name="sky")
+    layered.create_pixel_layer_from_array(smooth(20, 10), name="tree")
+    layered.save(tmp_path / "a.psd")
+    made = studio()
+    data = (tmp_path / "a.psd").read_bytes()
+    state = made.post("/api/open?wait&name=a.psd", content=data, json=None)
+    assert [v["name"] for v in state["layers"]] == ["sky", "tree"]
+
+
+def test_a_photoshop_file_without_layers_is_a_raster(studio, tmp_path):
+    psd_tools = pytest.importorskip("psd_tools")
+    psd_tools.PSDImage.frompil(Image.fromarray(smooth(40, 30))).save(tmp_path / "a.psd")
+    made = studio()
+    data = (tmp_path / "a.psd").read_bytes()
+    made.post("/api/open?wait&name=a.psd", content=data, json=None)
+    state = made.settled()
+    assert (state["stage"], state["found"]) == ("pointing", True)
+
+
+def test_the_folder_is_found_from_other_places(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    folder = Folder.new(Path("sessions"))
+    monkeypatch.chdir("/")
+    assert folder.add("a.png", b"a") == "a.png"
+    assert list(tmp_path.glob("sessions/*/files/a.png"))
 
 
 # The server as a process
