@@ -103,6 +103,51 @@ def test_from_a_dropped_photograph_to_a_saved_file(photo, tmp_path):
     assert image.undone(2).edited(*edits).to_bytes() == saved
 
 
+def test_pointing_tools(photo, tmp_path):
+    with served(tmp_path / "kept", str(photo)) as address, opened(address, tmp_path) as studio:
+        page = studio.page
+
+        def regions():
+            return {r["name"]: r for r in studio.state["regions"] if not r["back"]}
+
+        def made(action):
+            before = set(regions())
+            studio.after(action)
+            page.wait_for_selector(".christen input")
+            page.keyboard.press("Escape")
+            (name,) = set(regions()) - before
+            return name
+
+        studio.until("studio.store.state.regions?.length > 1")
+        page.click("#got-it")
+        for name in regions():
+            studio.after(studio.row(name).get_by_label("Remove").click)
+        studio.press("r")
+        boxed = made(lambda: studio.drag((195, 50), (378, 250)))
+        studio.press("s")
+        scribbled = made(lambda: studio.drag((90, 170), (110, 230)))
+        studio.shoot("20-pointing")
+
+        # Brush and eraser are exact: they change the chosen one, where they go.
+        def area(name):
+            return regions()[name]["area"]
+
+        before = area(scribbled)
+        studio.press("b")
+        studio.after(lambda: studio.drag((20, 200), (50, 200)))
+        grown = area(scribbled)
+        assert grown > before
+        studio.press("e")
+        studio.after(lambda: studio.drag((20, 200), (50, 200)))
+        assert area(scribbled) == pytest.approx(before, abs=2)
+        studio.after(lambda: studio.press("Control+z"))
+        assert area(scribbled) == grown
+        studio.row(boxed).click()
+        studio.row(scribbled).click(modifiers=["Control"])
+        studio.after(page.get_by_role("button", name="Merge both").click)
+        assert len(regions()) == 1
+
+
 def test_tools_of_the_canvas(layered, tmp_path):
     with served(tmp_path / "kept", str(layered)) as address, opened(address, tmp_path) as studio:
         page = studio.page

@@ -15,6 +15,8 @@ export const sway = new Map();
 
 /** @type {Map<string, {box: number[], scale: number}>} */
 const textures = new Map();
+/** The texture that was last there for a layer: drawn until a new one has come. @type {Map<string, string>} */
+const latest = new Map();
 /** @type {Map<string, Mesh>} */
 const meshes = new Map();
 /** @type {Map<string, Promise<any>>} */
@@ -46,6 +48,8 @@ async function texture(layer, scale) {
     if (layerOf(layer.name)?.texture !== layer.texture) return;
     textures.set(layer.texture, { box: got.box, scale });
     painter?.give(layer.texture, got);
+    latest.set(layer.name, layer.texture);
+    tidy();
     emit("drawn");
   });
 }
@@ -83,6 +87,14 @@ function spread({ skirt }, nodes, into) {
   }
 }
 
+/** Lets go of textures that nothing shows any more. */
+function tidy() {
+  const { layers } = store.state, names = new Set(layers.map((/** @type {any} */ l) => l.name));
+  for (const name of latest.keys()) if (!names.has(name)) latest.delete(name);
+  const kept = new Set([...latest.values(), ...layers.map((/** @type {any} */ l) => l.texture)]);
+  for (const key of [...textures.keys()]) if (!kept.has(key)) { textures.delete(key); painter?.drop(key); }
+}
+
 /** Fetches what the present state needs. @param {number} scale device pixels in a canvas pixel */
 export function load(scale) {
   const { state } = store;
@@ -90,11 +102,11 @@ export function load(scale) {
   const area = state.size[0] * state.size[1];
   const wanted = [1, 2, 4].find((s) => s >= scale * 0.8 || area * s * s * 4 > 12e6) ?? 4;
   const names = new Set(state.layers.map((/** @type {any} */ l) => l.name));
-  const keys = new Set(state.layers.map((/** @type {any} */ l) => l.texture));
-  for (const key of textures.keys()) if (!keys.has(key)) { textures.delete(key); painter?.drop(key); }
+  tidy();
   for (const name of meshes.keys()) if (!names.has(name)) meshes.delete(name);
   for (const layer of state.layers) {
     const have = textures.get(layer.texture);
+    if (have) latest.set(layer.name, layer.texture);
     if (!have) texture(layer, 1).catch(() => {});
     else if (have.scale < wanted && !layer.hidden && preview.size === 0) texture(layer, wanted).catch(() => {});
     if (outline(layer.name) === undefined) outlineOf(layer.name).then(() => emit("drawn"), () => {});
@@ -123,8 +135,9 @@ export function items(ghosts = []) {
   for (const layer of store.state.layers) {
     const change = preview.get(layer.name);
     if (change?.hidden ?? layer.hidden) continue;
+    const key = textures.has(layer.texture) ? layer.texture : latest.get(layer.name) ?? layer.texture;
     const item = {
-      key: layer.texture, matrix: change?.matrix ?? layer.matrix, box: textures.get(layer.texture)?.box ?? layer.box,
+      key, matrix: change?.matrix ?? layer.matrix, box: textures.get(key)?.box ?? layer.box,
       colour: change?.colour ?? layer.colour, opacity: change?.opacity ?? layer.opacity, mesh: /** @type {any} */ (null),
     };
     const mesh = meshes.get(layer.name), moves = sway.get(layer.name), bent = change?.bent;

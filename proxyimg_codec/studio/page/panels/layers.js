@@ -113,9 +113,15 @@ export function renaming(name, at = [...root.querySelectorAll(".layer")].find((r
   });
 }
 
+/** Pictures of layers: the old one shows until the new one has come. @type {Map<string, any>} */
+const images = new Map();
+
 /** @param {any} layer */
 function thumbnail(layer) {
-  const image = h("img", { src: `/api/layers/${layer.index}/thumbnail.png?side=64&key=${encodeURIComponent(thumbnailKey(layer))}`, alt: "", draggable: false, loading: "lazy" });
+  const src = `/api/layers/${layer.index}/thumbnail.png?side=64&key=${encodeURIComponent(thumbnailKey(layer))}`;
+  const image = images.get(layer.name) ?? h("img", { alt: "", draggable: false });
+  images.set(layer.name, image);
+  if (image.getAttribute("src") !== src) image.src = src;
   return h("span", {
     class: "thumb", title: "Drag onto another layer's picture to give it this texture",
     onpointerdown: (/** @type {PointerEvent} */ e) => {
@@ -161,7 +167,7 @@ function regionRow(region, total) {
   return row(region, [
     h("span", { class: "swatch", style: `--c:${colourOf(region)}` }), nameOf(region),
     h("span", { class: "share" }, `${((100 * region.area) / total).toFixed(region.area / total < 0.1 ? 1 : 0)}\u2009%`),
-    region.back ? null : button({ icon: "trash-2", label: `Remove ${region.name}`, class: "quiet", size: 14, onclick: () => regions("remove", { name: region.name }) }),
+    region.back ? h("span", { class: "gap" }) : button({ icon: "trash-2", label: `Remove ${region.name}`, class: "quiet", size: 14, onclick: () => regions("remove", { name: region.name }) }),
   ], region.back ? "back region-row" : "region-row", region.back ? {} : { onpointerdown: reordering(region, store.state.regions.length) });
 }
 
@@ -202,6 +208,7 @@ root.addEventListener("keydown", (/** @type {KeyboardEvent} */ e) => {
 });
 
 on("state list", build);
+on("state", (before) => { if (before.file !== store.state.file) images.clear(); });
 on("selection hover", () => {
   for (const r of /** @type {any} */ (root.querySelectorAll(".layer"))) {
     r.classList.toggle("on", store.selected.has(r.dataset.name));
