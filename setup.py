@@ -6,6 +6,7 @@ this machine alone.
 """
 
 import os
+import shutil
 import sys
 import sysconfig
 from pathlib import Path
@@ -13,6 +14,7 @@ from pathlib import Path
 from setuptools import Extension, setup
 from setuptools.command.bdist_wheel import bdist_wheel
 from setuptools.command.build_ext import build_ext
+from setuptools.command.build_py import build_py
 
 NATIVE = Path("proxyimg_codec/native")
 
@@ -79,6 +81,19 @@ class BuildLevels(build_ext):
         )
 
 
+class BuildWithDecoder(build_py):
+    """Build that takes the decoder in JavaScript along, for the pages that the studio exports."""
+
+    def run(self):
+        """Copies the modules."""
+        super().run()
+        if not self.editable_mode:
+            target = Path(self.build_lib, "proxyimg_codec", "studio", "decoder")
+            target.mkdir(parents=True, exist_ok=True)
+            for module in sorted(Path("web/pxi").glob("*.js")):
+                shutil.copy(module, target)
+
+
 class WheelOfAnyPython(bdist_wheel):
     """Wheel for a platform and all versions of Python."""
 
@@ -91,7 +106,11 @@ class WheelOfAnyPython(bdist_wheel):
 os.environ.setdefault("SOURCE_DATE_EPOCH", "1577836800")
 
 setup(
-    cmdclass={"build_ext": BuildLevels, "bdist_wheel": WheelOfAnyPython},
+    cmdclass={
+        "build_ext": BuildLevels,
+        "build_py": BuildWithDecoder,
+        "bdist_wheel": WheelOfAnyPython,
+    },
     ext_modules=[
         Extension(
             "proxyimg_codec.native._kernel",

@@ -79,6 +79,9 @@ class Source:
             return [[self.number() for _ in range(4)] for _ in range(1 + self.below(3))]
         if kind == "colour":
             return "#" + self.take(3).hex()
+        if kind == "motion":
+            preset = ("sway", "jelly", "bounce", "tremble")[self.below(4)]
+            return {"version": 1, "preset": preset, "duration": self.number(), "fps": 6}
         if "enum" in schema:
             return schema["enum"][self.below(len(schema["enum"]))]
         if schema["type"] == "array":

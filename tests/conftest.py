@@ -35,6 +35,8 @@ KINDS = {
     "cli/test_encode_cli.py": ("encoder", ENCODE),
     "cli/test_models_cli.py": ("encoder", ENCODE),
     "cli/test_layers_cli.py": ("encoder", ENCODE),
+    "studio/test_arap.py": ("browser", ()),
+    "studio": ("encoder", (*ENCODE, "httpx2", "starlette", "uvicorn")),
     "test_docs.py": ("encoder", ENCODE),
     "web": ("browser", ()),
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import re
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -205,11 +206,10 @@ def _texture(text: str) -> Values:
     target, given, source = text.partition("=")
     if not given or not source:
         raise ValueError
-    values: Values = {"op": "texture", "layer": key(target)}
-    if source.endswith("@shape"):
-        source, values["fit"] = source.removesuffix("@shape"), "shape"
+    fit = {"fit": "shape"} if source.endswith("@shape") else {}
+    source = source.removesuffix("@shape")
     file, layer = _foreign(source)
-    return {**values, "source": file or key(source), **layer}
+    return {"op": "texture", "layer": key(target), "source": file or key(source), **layer, **fit}
 
 
 def _generate(layer: str, prompt: str) -> Values:
@@ -223,20 +223,20 @@ def _foreign(source: str) -> tuple[str, Values]:
 
 
 def _insert(text: str) -> Values:
-    values: Values = {"op": "insert"}
     beside, given, source = text.partition("=")
+    where: Values = {}
     if given:
         side = "under" if beside.startswith("under:") else "over"
-        values[side] = key(beside.removeprefix("under:"))
+        where[side] = key(beside.removeprefix("under:"))
     else:
         source = text
     start, at, place = source.rpartition("@")
     if at and re.fullmatch(r"[-+.,\deE]+", place):
-        source, values["at"] = start, _floats(place, 2)
+        source, where = start, {"at": _floats(place, 2), **where}
     if not source:
         raise ValueError
     file, layer = _foreign(source)
-    return {**values, "source": file or source, **layer}
+    return {"op": "insert", "source": file or source, **layer, **where}
 
 
 def _recolour(layer: str, changes: str) -> Values:
@@ -270,6 +270,19 @@ def _cut(text: str) -> Values:
 
 def _merge(layer: str, other: str) -> Values:
     return {"op": "merge", "layer": key(layer), "other": key(other)}
+
+
+def _animate(text: str) -> Values:
+    from ..animate.presets import PRESETS
+    from ..io.files import read_bytes
+
+    if text in PRESETS:
+        return {"op": "animate", "motion": {"version": 1, "preset": text}}
+    where, words = ("--animate", text) if text.startswith("{") else (text, None)
+    try:
+        return {"op": "animate", "motion": json.loads(words or read_bytes(text))}
+    except (ValueError, RecursionError) as error:
+        raise UsageError(f"{where}: is not valid JSON: {error}") from None
 
 
 def _group(text: str) -> Values:
@@ -332,6 +345,8 @@ FLAGS = (
         "front, back, forward, backward, or a position from the back"),
     Flag("--hide", _named("hide"), ["NAME"], "stop drawing"),
     Flag("--show", _named("show"), ["NAME"], "draw again"),
+    Flag("--animate", _animate, ["MOTION"],
+        "let layers move: a preset of pxi-animate, a motion file, or its JSON"),
     Flag("--still", _named("still"), ["NAME"], "forget the motion"),
     Flag("--opacity", _geometry("opacity", value=1), ["NAME", "0-1"], "set the opacity"),
     Flag("--texture", _texture, ["NAME=SOURCE"],

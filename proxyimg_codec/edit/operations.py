@@ -63,6 +63,7 @@ KINDS: dict[str, dict[str, Any]] = {
     "weighting": {"enum": ["sds", "uniform"]},
     "precision": {"enum": ["full", "half", "bfloat"]},
     "colour": {"type": "string", "pattern": "^#[0-9a-fA-F]{6}$"},
+    "motion": {"type": "object"},
 }
 """JSON schema of each kind of parameter, by the name of the kind. A `layer` is one of the picture,
 or a group; a `foreign` one is that of another file."""

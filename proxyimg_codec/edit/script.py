@@ -11,14 +11,14 @@ from typing import Any
 
 from ..errors import PxiError, UsageError
 from ..model import Picture
-from . import appearance, complete, cut, generate, insert, merge, structure, transforms
+from . import appearance, complete, cut, generate, insert, merge, motion, structure, transforms
 from .history import undone
 from .operations import KINDS, OPERATIONS, run
 from .positions import Positions
 
 __all__ = [
     "OPERATIONS", "Row", "appearance", "apply", "complete", "cut", "generate", "insert", "merge",
-    "parse", "schema", "structure", "transforms",
+    "motion", "parse", "schema", "structure", "transforms",
 ]  # fmt: skip
 
 

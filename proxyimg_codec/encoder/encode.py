@@ -42,7 +42,7 @@ class Progress(Protocol):
         """Reports that `done` of `total` units of a stage are finished.
 
         Args:
-            stage: Name of the stage: ``layers`` or ``texture``.
+            stage: Name of the stage: ``layers``, ``hidden`` or ``texture``.
             done: Number of finished units.
             total: Number of units of the stage.
         """

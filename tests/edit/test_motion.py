@@ -10,6 +10,7 @@ import proxyimg_codec as pxi
 from conformance.make.builders import Numbers, texture
 from conformance.make.valid.motion import moving as with_tracks
 from conformance.make.valid.motion import track as random_track
+from proxyimg_codec.animate.motion import Motion
 from proxyimg_codec.errors import UsageError
 from proxyimg_codec.geometry.mesher import derived
 from proxyimg_codec.model import Layers
@@ -171,3 +172,33 @@ def test_the_tool_shows_and_forgets_motion(tool, tmp_path, image):
     tool("edit", tmp_path / "out.pxi", tmp_path / "back.pxi", "--undo", "1")
     assert (tmp_path / "back.pxi").read_bytes() == (tmp_path / "in.pxi").read_bytes()
     tool("edit", tmp_path / "in.pxi", tmp_path / "no.pxi", "--still", "cat", code=2)
+
+
+SWAY = {"version": 1, "preset": "sway", "duration": 0.5, "fps": 8}
+
+
+def test_a_motion_is_an_edit(small_pxi):
+    image = pxi.open(small_pxi)
+    edited = image.edited({"op": "animate", "motion": SWAY})
+    boxes = {v.name: v.boundary.bounds() for v in image.layers if v.boundary is not None}
+    assert edited.baked() == image.animated(Motion.from_json(json.dumps(SWAY), boxes))
+    assert edited.undone() == image
+    again = pxi.from_bytes(edited.to_bytes())
+    assert again == edited
+    assert again.timeline.seconds == 0.5
+    moving = edited.edited({"op": "animate", "motion": {**SWAY, "layers": {"bar": {}}}})
+    assert moves(moving).keys() == {"bar"}
+    assert moving.undone() == edited
+
+
+def test_pxi_edit_takes_presets_motion_files_and_json(small_pxi, tmp_path, tool):
+    words = json.dumps(SWAY)
+    (tmp_path / "sway.json").write_text(words)
+    wanted = pxi.open(small_pxi).edited({"op": "animate", "motion": SWAY}).to_bytes()
+    for given in (words, tmp_path / "sway.json"):
+        tool("edit", small_pxi, tmp_path / "out.pxi", "-f", "--animate", given)
+        assert (tmp_path / "out.pxi").read_bytes() == wanted
+    (tmp_path / "sway.json").write_text("{")
+    ran = tool("edit", small_pxi, tmp_path / "b.pxi", "--animate", tmp_path / "sway.json", code=2)
+    assert "sway.json: is not valid JSON" in ran.err
+    tool("edit", small_pxi, tmp_path / "b.pxi", "--animate", "nothing.json", code=3)

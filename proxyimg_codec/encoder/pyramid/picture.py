@@ -79,20 +79,10 @@ def encode_picture(
         UsageError: A target size or PSNR is out of reach.
     """
     height, width = picture.shape[:2]
-    boundaries = [v.boundary for v in plan.layers]
-    views, softs = list[View](), dict[int, Soft]()
-    clear = np.ones((height, width), np.float32)
-    for k, layer in enumerate(plan.layers):
-        covered = coverage_of(layer.boundary, width, height).reshape(height, width)
-        clear *= 1 - covered
-        box, cuts = _view(boundaries, k, covered)
-        if layer.alpha is not None and cuts is not None:
-            found = soft_rasters(picture[..., :3], layer.alpha, covered, cuts)
-            softs |= {} if found is None else {k: found}
-        views.append((box, replace(cuts, unmix=False) if cuts and k in softs else cuts))
+    views, softs, share = _views(picture, plan)
     rasters = [colour_of(picture)._replace(structural=settings.tune == "ms-ssim")]
     if plan.channels == 4:
-        rasters.append(alpha_of(within(picture[..., 3], 1 - clear, alike(settings))))
+        rasters.append(alpha_of(within(picture[..., 3], share, alike(settings))))
     shared = len(rasters)
     own = [] if behind is None else _behind(rasters, views[0][1], behind)
     rasters += own
@@ -101,11 +91,11 @@ def encode_picture(
     for k, each in softs.items():
         numbers[k] = {"behind": len(rasters), "matte": len(rasters) + 1}
         rasters += [each.behind, each.matte]
-    copies = [
-        None if own and k == 0
-        else copies_of(picture, cuts, settings, softs[k].samples if k in softs else None)
-        for k, (_, cuts) in enumerate(views)
-    ]  # fmt: skip
+    copies = []
+    for k, (_, cuts) in enumerate(views):
+        report("hidden", k, len(views))
+        soft = softs[k].samples if k in softs else None
+        copies.append(None if own and k == 0 else copies_of(picture, cuts, settings, soft))
 
     def picture_of(sources: Sequence[Planes]) -> Picture:
         alpha = sources[1] if shared > 1 else None
@@ -119,6 +109,23 @@ def encode_picture(
                        groups=plan.groups)  # fmt: skip
 
     return encode_rasters(rasters, picture_of, picture, settings, report)
+
+
+def _views(picture: Floats, plan: Plan) -> tuple[list[View], dict[int, Soft], Floats]:
+    """Rectangles and cuts of all layers, rasters of soft ones, and coverage of all together."""
+    height, width = picture.shape[:2]
+    boundaries = [v.boundary for v in plan.layers]
+    views, softs = list[View](), dict[int, Soft]()
+    clear = np.ones((height, width), np.float32)
+    for k, layer in enumerate(plan.layers):
+        covered = coverage_of(layer.boundary, width, height).reshape(height, width)
+        clear *= 1 - covered
+        box, cuts = _view(boundaries, k, covered)
+        if layer.alpha is not None and cuts is not None:
+            found = soft_rasters(picture[..., :3], layer.alpha, covered, cuts)
+            softs |= {} if found is None else {k: found}
+        views.append((box, replace(cuts, unmix=False) if cuts and k in softs else cuts))
+    return views, softs, 1 - clear
 
 
 def encode_rasters(

@@ -65,7 +65,16 @@ def point_at(rgb: NDArray[np.uint8], prompts: Sequence[Prompt], jobs: int = 1) -
         One region a prompt, in their order, none of them empty. Only those overlap of which one is
         a part of the other.
     """
-    scene = scene_of(rgb, find_maps(rgb, jobs))
+    return point_in(scene_in(rgb, jobs), rgb, prompts)
+
+
+def scene_in(rgb: NDArray[np.uint8], jobs: int = 1) -> Scene:
+    """Scene of a picture, uint8 [H, W, 3] in sRGB, for any number of calls of `point_in`."""
+    return scene_of(rgb, find_maps(rgb, jobs))
+
+
+def point_in(scene: Scene, rgb: NDArray[np.uint8], prompts: Sequence[Prompt]) -> list[Region]:
+    """Finds objects as `point_at`, in the scene of a picture that is known already."""
     seeds = [_Seeds(p, scene, rgb.shape[:2]) for p in prompts]
     probable = [_probable(scene, one, seeds) for one in seeds]
     regions = []
