@@ -55,8 +55,8 @@ typedef struct pxi_error {
 } pxi_error;
 #define PXI_ERROR_INIT {sizeof(pxi_error), 0, -1, {0}, {0}}
 
-/* Called again and again with how much is done, in 0..1, by the thread that calls the library.
- * What is not 0 ends the call with PXI_CANCELLED. */
+/* Called again and again with how much is done, in 0..1, by one thread at a time, which need not be
+ * the caller's if it asks for several. What is not 0 ends the call with PXI_CANCELLED. */
 typedef int (*pxi_progress)(void *context, double share);
 
 /* A limit other than the default, by its name in chapter 13 of the specification: "samples" ... */
@@ -69,9 +69,10 @@ typedef struct pxi_options {
     uint32_t size;
     uint32_t limit_count;
     const pxi_limit *limits;
-    /* Puts the bytes of a registered model where they are asked for, which have to stay until the
-     * file is closed, and returns 0. Only called for models that the library does not hold. */
-    int (*model)(void *context, uint32_t number, const void **bytes, size_t *count);
+    /* Finds the bytes of a registered model by the name of its file, such as "pyramid-1.bin", which
+     * have to stay until that call ends, and returns 0. Without it, the models are those that are
+     * built into the library. It may be called whenever the file is drawn. */
+    int (*model)(void *context, const char *name, const void **bytes, size_t *count);
     void *model_context;
     pxi_progress progress; /* while the file is opened */
     void *progress_context;
@@ -82,7 +83,7 @@ typedef struct pxi_options {
 PXI_API uint32_t pxi_abi(void);
 
 /*
- * Opens a file in memory and checks it. The bytes have to stay until the file is closed.
+ * Opens a file in memory and checks it. The bytes are copied.
  *
  * `options` may be null. `*out` is null after a failure.
  */
@@ -111,6 +112,7 @@ typedef struct pxi_info {
     uint32_t duration;      /* of the motion in milliseconds; 0 if the picture is still */
     uint32_t fps;           /* frames a second that the motion was made for */
     uint32_t loop;          /* 1 if the motion repeats */
+    uint32_t primaries, transfer; /* colour by the code points of ITU-T H.273; 0: not said, sRGB */
 } pxi_info;
 
 PXI_API pxi_status pxi_describe(const pxi_file *file, pxi_info *info, pxi_error *error);
@@ -130,13 +132,13 @@ PXI_API pxi_status pxi_describe_layer(const pxi_file *file, uint32_t number, pxi
 
 typedef struct pxi_metadata {
     uint32_t size;
-    char kind[4];       /* "iCCp", "eXIf", "xMPd" ...: chapter 11 of the specification */
+    char kind[12];      /* "icc", "exif" or "xmp" */
     size_t count;
-    const void *bytes;  /* decompressed; as long as the file is open */
+    const void *bytes;  /* as long as the file is open */
 } pxi_metadata;
 
 /* Block `number` of the metadata. The blocks of a file that is otherwise sound may be damaged. */
-PXI_API pxi_status pxi_describe_metadata(pxi_file *file, uint32_t number, pxi_metadata *block, pxi_error *error);
+PXI_API pxi_status pxi_describe_metadata(const pxi_file *file, uint32_t number, pxi_metadata *block, pxi_error *error);
 
 /* Samples of a pixel: red, green, blue and straight alpha. */
 typedef enum pxi_format {

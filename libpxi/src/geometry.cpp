@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <numeric>
 
-#include "arrays.h"
+#include "coded.h"
 #include "core.h"
 
 namespace pxi {
@@ -89,7 +89,7 @@ std::vector<int32_t> coverage(const Boundary &scaled, const Box &box, Budget &bu
     budget.spend(WORK, chords);
     std::vector<int64_t> cells((size_t)box.height * (box.width + 2));
     std::vector<int32_t> out((size_t)box.size());
-    baseline::Cover cover = {box.width, box.height, 0, budget.left(WORK), cells.data(), out.data()};
+    loops::Cover cover = {box.width, box.height, 0, budget.left(WORK), cells.data(), out.data()};
     core().coverage(&cover, segments.data(), log2.data(), (int64_t)log2.size());
     budget.spend(WORK, cover.work);
     return out;

@@ -13,7 +13,7 @@ namespace pxi {
 typedef std::vector<int64_t> Path;      // control points x0, y0, x1, y1, .., three a segment
 typedef std::vector<Path> Boundary;     // none: the whole canvas
 
-constexpr int64_t COVERED = 131072;     // the coverage of a sample that is covered as a whole
+constexpr int64_t FULL = 131072;     // the coverage of a sample that is covered as a whole
 
 // The paths of a layer at rest in 2**-unit canvas pixels.
 Boundary decode_boundary(const Layr &layr);
@@ -27,7 +27,7 @@ struct Box {
     int64_t size() const { return (int64_t)width * height; }
 };
 
-// Coverage 0..COVERED of the samples of a rectangle, [height][width], by paths in 1/256 sample.
+// Coverage 0..FULL of the samples of a rectangle, [height][width], by paths in 1/256 sample.
 std::vector<int32_t> coverage(const Boundary &scaled, const Box &box, Budget &budget);
 
 // The same of the columns from 0 on, and rows from `top` to before `bottom`.

@@ -4,7 +4,7 @@
 #include <unordered_map>
 #include <unordered_set>
 
-#include "arrays.h"
+#include "coded.h"
 #include "geometry.h"
 
 namespace pxi {
@@ -234,14 +234,11 @@ Refined decode_mesh(const Mesh &mesh, Budget &budget) {
         for (size_t i = 0; i < base.points.size(); i++) out.ends.push_back((int32_t)(i >> 1));
         for (size_t i = 0; i < base.triangles.size(); i++) triangles.push_back({(int)i, base.triangles[i]});
     }
-    Bytes data = mesh.splits;
+    size_t next = 0;
     for (int level = 0; level < mesh.levels; level++) {
         budget.spend(FACES, 4 * (int64_t)triangles.size());
-        need(data.size() >= 4, "MSH-11", "split flags are cut off", mesh.at);
-        const uint64_t length = data[0] | data[1] << 8 | data[2] << 16 | (uint64_t)data[3] << 24;
-        need(length <= data.size() - 4, "MSH-11", "split flags are cut off", mesh.at);
-        const auto flags = decode_array(data.subspan(4, length), 1, 1, (int)triangles.size(), 1, nullptr, mesh.at);
-        data = data.subspan(4 + length);
+        const Bytes data = take_array(mesh.splits, &next, "MSH-11", mesh.at);
+        const auto flags = decode_array(data, 1, 1, (int)triangles.size(), 1, nullptr, mesh.at);
         split.clear();
         for (size_t i = 0; i < triangles.size(); i++) (flags[i] ? split : whole).push_back(triangles[i]);
         need(!split.empty(), "MSH-11", "a refinement of a mesh splits nothing", mesh.at);
@@ -249,7 +246,7 @@ Refined decode_mesh(const Mesh &mesh, Budget &budget) {
         triangles.clear();
         for (const Child &child : split) four(child, middles, triangles);
     }
-    need(data.empty(), "MSH-11", "split flags are left over", mesh.at);
+    need(next == mesh.splits.size(), "MSH-11", "split flags are left over", mesh.at);
     whole.insert(whole.end(), triangles.begin(), triangles.end());
     out.faces = closed(std::move(whole), middles);
     return out;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstdlib>
 
-#include "arrays.h"
+#include "coded.h"
 
 namespace pxi {
 

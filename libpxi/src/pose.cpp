@@ -4,7 +4,7 @@
 #include <bit>
 #include <cstdlib>
 
-#include "arrays.h"
+#include "coded.h"
 
 namespace pxi {
 
