@@ -10,6 +10,8 @@ static const uint8_t SIGNATURE[] = {0x89, 'P', 'X', 'I', '\r', '\n', 0x1a, '\n'}
 static const int MINORS[] = {1, 2, 3, 9, 10, 11, 12};
 static const size_t PREFIX = 12;
 
+namespace {
+
 // Ranks of chunks (CON-11). What is not single may come any number of times.
 struct Known {
     const char *type;
@@ -55,6 +57,8 @@ class Crc {
         return ~crc;
     }
 };
+
+}  // namespace
 
 static int version_of(Bytes data) {
     const size_t there = std::min(data.size(), sizeof SIGNATURE);

@@ -44,6 +44,8 @@ void Stream::finish() const {
     for (const uint32_t state : states) need(state == LOW, "ENT-7", "a stream ends in wrong states", at);
 }
 
+namespace {
+
 // Raw bits, most significant first (ENT-15, ENT-16).
 class Bits {
     Bytes data;
@@ -82,6 +84,8 @@ struct Waves {
         }
     }
 };
+
+}  // namespace
 
 std::vector<uint8_t> decode_array(Bytes data, int channels, int height, int width, int bits,
                                   const uint8_t *stored, Place at) {

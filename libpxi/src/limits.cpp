@@ -8,10 +8,14 @@ namespace pxi {
 
 static const int64_t SMALL_FILE = 1 << 20;  // at most so many bytes: the stricter limits hold too
 
+namespace {
+
 struct Default {
     const char *name;
     int log2;
 };
+}  // namespace
+
 static const Default DEFAULTS[LIMIT_COUNT] = {
     {"file_bytes", 30}, {"chunks", 16},        {"side", 20},           {"layers", 10},
     {"networks", 6},    {"segments", 16},      {"gates", 16},          {"small_gates", 15},

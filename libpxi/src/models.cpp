@@ -17,6 +17,8 @@ static bool built_in(const char *, Bytes *found) {
 static bool built_in(const char *, Bytes *) { return false; }
 #endif
 
+namespace {
+
 struct Registration {
     int number;
     const char *file;
@@ -24,6 +26,8 @@ struct Registration {
 };
 static const char FIRST[] = "pyramid-1.bin";
 static const Registration REGISTERED[] = {{1, FIRST, true}, {2, FIRST, false}};
+
+}  // namespace
 
 static const Registration *registration(int number) {
     for (const Registration &r : REGISTERED)
@@ -33,6 +37,8 @@ static const Registration *registration(int number) {
 
 bool Models::registered(int number) { return registration(number); }
 bool Models::padded(int number) { return registration(number)->padded; }
+
+namespace {
 
 // Arrays of a model's file, one after the other.
 class Arrays {
@@ -66,6 +72,8 @@ class Arrays {
     }
     bool all() const { return at == data.size(); }
 };
+
+}  // namespace
 
 // Half of the synthesis filters of the CDF 9/7 wavelet, orthonormal (PYR-32).
 static double wavelet(bool high, int n) {

@@ -1,0 +1,100 @@
+#include "hidden.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "coded.h"
+#include "core.h"
+
+namespace pxi {
+
+static const int DRIFT = 3072;  // the largest correction of a copy (PYR-50)
+static const int TELLING = 3;    // distance up to which samples tell the colour behind (PYR-52)
+
+void even_out(Components &colours, size_t count) {
+    while (colours.size() < count) colours.push_back(colours[0]);
+}
+
+std::vector<uint8_t> sources_of(const Texr &t) {
+    if (t.sources.empty()) return {};
+    const int side = 1 << t.grain, columns = (t.part[2] + side - 1) / side, rows = (t.part[3] + side - 1) / side;
+    const int most = (int)t.offsets.size() / 2, bits = std::bit_width((unsigned)most);
+    const int channels = bits <= 4 ? 1 : 2;
+    std::vector<uint8_t> out =
+        decode_array(t.sources, channels, rows, columns, channels == 1 ? bits : 4, nullptr, t.at);
+    const size_t size = (size_t)rows * columns;
+    for (size_t i = 0; channels == 2 && i < size; i++) out[i] |= (uint8_t)(out[size + i] << 4);
+    out.resize(size);
+    bool any = false;
+    for (const uint8_t source : out) {
+        need(source <= most, "PYR-48", "a source has no offset", t.at);
+        any |= source;
+    }
+    need(any, "PYR-48", "all sources are 0", t.at);
+    return out;
+}
+
+static int32_t whole(float v) { return (int32_t)std::nearbyint(FILL_ONE * v); }
+
+Components filled(const Texr &t, const Components &own, Mask known, const Behind *behind) {
+    const int w = t.part[2], h = t.part[3], channels = (int)own.size();
+    const int64_t size = (int64_t)w * h;
+    std::vector<int32_t> values(size * channels);
+    for (int64_t i = 0; i < size; i++) {
+        const bool other = behind && !known[i] && behind->there[i];
+        const Components &from = other ? behind->values : own;
+        for (int c = 0; c < channels; c++) values[c * size + i] = whole(from[c][i]);
+        if (other) known[i] = 1;
+    }
+    const loops::Plane plane = {channels, h, w, values.data(), known.data()};
+    const std::vector<uint8_t> sources = sources_of(t);
+    if (!sources.empty()) {
+        const int side = 1 << t.grain;
+        loops::Copies copies = {plane, known.data(), t.offsets.data(), sources.data(), (h + side - 1) / side,
+                                (w + side - 1) / side, t.grain, DRIFT, FILL_ONE};
+        check_core(core().completed(&copies), t.at);
+    }
+    check_core(core().diffused(&plane, known.data()), t.at);
+    Components out(channels);
+    for (int c = 0; c < channels; c++) {
+        out[c].resize(size);
+        for (int64_t i = 0; i < size; i++) out[c][i] = (float)values[c * size + i] / FILL_ONE;
+    }
+    return out;
+}
+
+// Calls each(number) for the samples of a part that are at most `reach` away from one.
+template <class Each> static void around(int64_t i, int reach, int w, int h, Each each) {
+    const Window near = Window{(int)(i / w), (int)(i / w) + 1, (int)(i % w), (int)(i % w) + 1}.grown(reach, {h, w});
+    for (int y = near.top; y < near.bottom; y++)
+        for (int x = near.left; x < near.right; x++) each((int64_t)y * w + x);
+}
+
+void unmix(const Edge &edge, const Components &mixed, Components &values, int w, int h) {
+    std::vector<double> sums(values.size());
+    for (const auto &[i, share] : edge.share) {
+        int count = 0;
+        std::fill(sums.begin(), sums.end(), 0);
+        around(i, TELLING, w, h, [&](int64_t j) {
+            if (!edge.free[j]) return;
+            count++;
+            for (size_t c = 0; c < mixed.size(); c++) sums[c] += mixed[c][j];
+        });
+        for (size_t c = 0; count && c < mixed.size(); c++)
+            values[c][i] = (float)std::clamp((mixed[c][i] - (1 - share) * sums[c] / count) / share, 0., 1.);
+    }
+    for (int64_t i = 0; i < (int64_t)edge.outer.size(); i++) {
+        if (!edge.outer[i]) continue;
+        int count = 0;
+        std::fill(sums.begin(), sums.end(), 0);
+        around(i, 1, w, h, [&](int64_t j) {
+            if (!edge.share.count(j)) return;
+            count++;
+            for (size_t c = 0; c < values.size(); c++) sums[c] += values[c][j];
+        });
+        for (size_t c = 0; count && c < values.size(); c++) values[c][i] = (float)(sums[c] / count);
+    }
+}
+
+}  // namespace pxi

@@ -1,0 +1,124 @@
+#include "raster.h"
+
+#include <cmath>
+
+namespace pxi {
+
+static const int STEP_ORIGIN = 293;
+static const int AROUND = 3;   // positions around a window that its synthesis depends on
+static const int STRIP = 256;  // rows that are made at once, which bounds memory
+
+Raster::Raster(const Plan &plan, const Weights &weights, const Watch &watch)
+    : plan(plan), weights(weights), watch(watch), grid(plan), latents(plan, weights, watch) {}
+
+// Makes planes above a level, [rows][columns][3] of a window that holds the one that is asked for.
+std::vector<float> Raster::finer(int level, Window window, Window *under) {
+    const Shape coarser = grid.at(level + 1);
+    const Window above = window.halved().grown(AROUND, coarser);
+    *under = above.doubled(grid.at(level));
+    const std::vector<int32_t> high = cut(latents.level(level + 1, above), 9, coarser, above);
+    const std::vector<float> planes = cut(low(level + 1, above), 1, coarser, above, 3);
+    const Synthetic &w = weights.synthesis_of(level + 1);
+    const float t = (float)(plan.step - STEP_ORIGIN) / 128;
+    std::vector<float> gain(9), bias = w.first_bias, out(3 * under->shape().size());
+    for (int k = 0; k < 9; k++) gain[k] = (float)std::exp((double)(w.gain[k] + w.gain_by_step[k] * t));
+    for (size_t i = 0; i < bias.size(); i++) bias[i] += w.first_by_step[i] * t;
+    const Listening hearing(watch);
+    const loops::Synthesis task = {w.linear.data(), w.first.data(), bias.data(), w.second.data(),
+                                   w.second_bias.data(), w.third.data(), w.third_bias.data(), gain.data(),
+                                   weights.hidden, above.rows(), above.columns(), under->rows(), under->columns(),
+                                   planes.data(), high.data(), out.data(), hearing.function()};
+    check_core(core().pyramid_synthesis(&task), plan.at);
+    return out;
+}
+
+// Planes [h][w][3] above a level, of which a window is made.
+const float *Raster::low(int level, Window window) {
+    const Shape shape = grid.at(level);
+    Level &own = lows[level];
+    if (level == grid.levels) {
+        if (own.planes) return own.planes.data();
+        const std::vector<int32_t> &lowest = latents.lowest();
+        own.planes.make((int64_t)lowest.size());
+        for (int c = 0; c < 3; c++)
+            for (int64_t i = 0; i < shape.size(); i++) own.planes[3 * i + c] = (float)lowest[c * shape.size() + i];
+        return own.planes.data();
+    }
+    if (!own.planes) own.planes.make(3 * shape.size()), own.made = Made(shape);
+    for (const Window &part : own.made.lacking(window)) {
+        for (Window strip = part; strip.top < part.bottom; strip.top = strip.bottom) {
+            strip.bottom = std::min(strip.top + STRIP, part.bottom);
+            Window under;
+            const std::vector<float> found = finer(level, strip, &under);
+            paste(found.data(), under.shape(), strip.inside(under), own.planes.data(), shape, strip, 1, 3);
+        }
+        own.made.add(part);
+    }
+    return own.planes.data();
+}
+
+// Factors [3][3] that even planes take on by the linear part of a level.
+static std::vector<double> evenly(const Synthetic &w) {
+    std::vector<double> out(9);
+    for (int output = 0; output < 12; output++)
+        for (int plane = 0; plane < 3; plane++) {
+            double sum = 0;
+            for (int tap = 0; tap < 25; tap++) sum += w.linear[(output * 12 + plane) * 25 + tap];
+            out[output / 4 * 3 + plane] += sum / 4;
+        }
+    return out;
+}
+
+// Samples of a window of planes above a level, which begin at `planes`, in rows of `stride` numbers.
+void Raster::colour(int level, const float *planes, int64_t stride, float *out, Shape shape, Window at) {
+    std::vector<float> matrix = weights.to_colour;
+    for (int k = 1; k <= level; k++) {
+        const std::vector<double> factors = evenly(weights.synthesis_of(k));
+        std::vector<float> next(9);
+        for (int i = 0; i < 9; i++) {
+            double sum = 0;
+            for (int j = 0; j < 3; j++) sum += matrix[i / 3 * 3 + j] * factors[3 * j + i % 3];
+            next[i] = (float)sum;
+        }
+        matrix = next;
+    }
+    for (float &weight : matrix) weight *= (float)std::exp2(plan.step / 64.);
+    const int components = plan.components;
+    std::vector<float> row(3 * (size_t)at.columns());
+    for (int y = at.top; y < at.bottom; y++, planes += stride) {
+        core().coloured(planes, matrix.data(), at.columns(), row.data());
+        float *to = out + ((int64_t)y * shape.columns + at.left) * components;
+        if (components == 3)
+            for (size_t i = 0; i < row.size(); i++) to[i] = std::clamp(row[i] / 255, 0.f, 1.f);
+        else
+            for (int x = 0; x < at.columns(); x++)
+                to[x] = std::clamp((row[3 * x] + row[3 * x + 1] + row[3 * x + 2]) / 3 / 255, 0.f, 1.f);
+    }
+}
+
+const float *Raster::samples(int level, Window window) {
+    const Shape wanted = shape(level);
+    Level &own = coloured[level];
+    if (!own.planes) own.planes.make(wanted.size() * plan.components), own.made = Made(wanted);
+    for (const Window &part : own.made.lacking(window)) {
+        for (Window strip = part; strip.top < part.bottom; strip.top = strip.bottom) {
+            strip.bottom = std::min(strip.top + STRIP, part.bottom);
+            if (level == 0) {
+                Window under;
+                const std::vector<float> found = finer(0, strip, &under);
+                const Window at = strip.inside(under);
+                const int64_t stride = 3 * (int64_t)under.columns();
+                colour(0, found.data() + at.top * stride + 3 * at.left, stride, own.planes.data(), wanted, strip);
+            } else {
+                const int64_t stride = 3 * (int64_t)wanted.columns;
+                const float *planes = low(level, strip) + strip.top * stride + 3 * strip.left;
+                colour(level, planes, stride, own.planes.data(), wanted, strip);
+            }
+        }
+        own.made.add(part);
+    }
+    if (level == 0 && own.made.whole()) latents.forget();
+    return own.planes.data();
+}
+
+}  // namespace pxi
