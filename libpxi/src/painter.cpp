@@ -109,25 +109,29 @@ bool Painter::cover(const Box &box, std::vector<float> &out, int64_t *start, Bud
     return true;
 }
 
-const Painter::Source &Painter::sampled() {
+// Samples of the raster itself, whether they show or not.
+const Painter::Source &Painter::as_raster() {
     const Lock lock(canvas.decoding);
-    if (source) return *source;
-    Textures &textures = *canvas.image.textures;
-    const auto [x, y, w, h] = texr.part;
-    auto made = std::make_unique<Source>();
-    if (canvas.seen) {
-        made->samples = textures.raster(texr.planes, 0, {window.top + y, window.bottom + y, window.left + x, window.right + x});
-        made->at = made->samples.at + ((int64_t)y * made->samples.columns + x) * made->samples.channels;
-    } else {
-        made->samples = textures.view(number, canvas.scene, window);
-        made->at = made->samples.at;
+    if (!raster) {
+        const auto [x, y, w, h] = texr.part;
+        const Window part = {window.top + y, window.bottom + y, window.left + x, window.right + x};
+        const Samples samples = canvas.image.textures->raster(texr.planes, 0, part);
+        raster = std::make_unique<Source>(samples, samples.at + ((int64_t)y * samples.columns + x) * samples.channels);
     }
-    source = std::move(made);
-    return *source;
+    return *raster;
+}
+
+const Painter::Source &Painter::as_view() {
+    const Lock lock(canvas.decoding);
+    if (!view) {
+        const Samples samples = canvas.image.textures->view(number, canvas.scene, window);
+        view = std::make_unique<Source>(samples, samples.at);
+    }
+    return *view;
 }
 
 const std::vector<float> &Painter::bordered() {
-    const Source &from = sampled();
+    const Source &from = as_view();
     const Lock lock(canvas.decoding);
     if (!padded.empty()) return padded;
     const int channels = from.samples.channels, C = std::max(channels, 3);
@@ -182,7 +186,7 @@ void Painter::paint_view(const Box &box, const std::vector<int32_t> &at, const L
         y.add(along(shown ? shown->y[i] : view.y(box.y + i), 1), texr.part[3]);
     if (!shown && x.whole && y.whole) return copy_exact(box, at, x, y, out);
     const std::vector<float> &samples = bordered();
-    const int channels = std::max(sampled().samples.channels, 3), stride = window.columns() + TAPS - 1;
+    const int channels = std::max(as_view().samples.channels, 3), stride = window.columns() + TAPS - 1;
     std::vector<int32_t> first(CHUNK);
     std::vector<float> fx(CHUNK), fy(CHUNK), found((size_t)CHUNK * channels);
     for (int i = 0; i < n; i += CHUNK) {
@@ -199,7 +203,7 @@ void Painter::paint_view(const Box &box, const std::vector<int32_t> &at, const L
 }
 
 void Painter::copy_exact(const Box &box, const std::vector<int32_t> &at, const Positions &x, const Positions &y, float *out) {
-    const Source &from = sampled();
+    const Source &from = canvas.seen[number] ? as_raster() : as_view();
     const int channels = from.samples.channels;
     std::vector<float> grey;
     for (size_t i = 0, end; i < at.size(); i = end) {  // in runs of samples that follow each other in a row

@@ -14,7 +14,7 @@ struct Canvas {
     const Request &request;
     Scene scene;
     std::map<int, Points> sway;  // by layer, as Motion::at gives it
-    bool seen = false;           // whether what hides samples of any layer hides what they would show, too
+    std::vector<uint8_t> seen;   // by layer: whether what hides samples of it hides what they would show, too
     Mutex decoding;              // of textures
 };
 
@@ -33,8 +33,9 @@ class Painter {
     struct Source {   // samples of the part of a pyramid texture, premultiplied
         Samples samples;
         const float *at;  // that of row 0 and column 0 of the part
+        Source(const Samples &s, const float *a) : samples(s), at(a) {}
     };
-    std::unique_ptr<Source> source;
+    std::unique_ptr<Source> raster, view;
     std::vector<float> padded;  // samples of the window with a border for interpolation
 
     struct Positions {  // of samples along one axis of a texture
@@ -46,7 +47,8 @@ class Painter {
 
     Window needed() const;
     int dim() const;  // features of a code
-    const Source &sampled();
+    const Source &as_raster();
+    const Source &as_view();
     const std::vector<float> &bordered();
     void prepare_nodes();
     void features(double x, double y, double *out) const;

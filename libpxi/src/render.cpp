@@ -148,19 +148,21 @@ void render(Image &image, const Request &request, const Put &put, const Told &to
     budget.spend(MULTIPLY_ADDS, (int64_t)request.drawn.size() * view.columns() * view.rows() * SAMPLE_COST);
     Progress progress(told);
     const Heard heard(*image.textures, progress);
-    Canvas canvas{image, request, {}, {}, false, {}};
-    canvas.scene = {std::vector<uint8_t>(image.file->layers.size()), request.moving};
+    Canvas canvas{image, request, {}, {}, {}, {}};
+    const size_t count = image.file->layers.size();
+    canvas.scene = {std::vector<uint8_t>(count), request.moving}, canvas.seen.resize(count);
     for (const int n : request.drawn) canvas.scene.drawn[n] = 1;
     if (request.moving) canvas.sway = image.motion->at(request.time);
     progress.at(0);
-    bool still = true;
+    bool all_solid = true, at_rest = true;
     for (const int n : request.drawn) {
-        const bool pyramid = image.file->textures[image.file->source(n)].coder == PYRAMID;
-        const bool in_place = !pyramid || image.textures->in_place(n, canvas.scene);
-        still &= in_place && solid(image, n, in_place);
+        const Texr &texr = image.file->textures[image.file->source(n)];
+        const bool in_place = texr.coder != PYRAMID || image.textures->in_place(n, canvas.scene);
+        all_solid &= solid(image, n, in_place), at_rest &= in_place;
+        canvas.seen[n] = in_place && texr.mask.empty() && !texr.matte;
     }
-    canvas.seen = still;
-    if (still && thumbnail(image, request, put, [&](double share) { progress.at(share); })) return;
+    if (!all_solid) std::fill(canvas.seen.begin(), canvas.seen.end(), 0);
+    else if (at_rest && thumbnail(image, request, put, [&](double share) { progress.at(share); })) return;
     std::vector<std::unique_ptr<Painter>> painters;  // front to back
     for (auto n = request.drawn.rbegin(); n != request.drawn.rend(); n++)
         painters.push_back(std::make_unique<Painter>(canvas, *n, budget));

@@ -77,7 +77,7 @@ static int parse(Command *c, int count, char **words) {
             if (problem) return wrong(problem, problem[0] == 't' && problem[2] == 'e' && problem[3] == 'r' ? word : value);
         }
     }
-    return c->in && !c->out == c->list ? 0 : wrong("one file to read, and one to write, are needed", "");
+    return c->in && c->list == !c->out ? 0 : wrong("one file to read, and one to write, are needed", "");
 }
 
 static void *read_whole(const char *path, size_t *size) {
