@@ -70,6 +70,9 @@ static void check_networks(const File &f, Budget &budget) {
 
 static void check_plans(const File &f, Budget &budget) {
     for (const Plan &p : f.plans) {
+        const int64_t columns = over(p.width, p.levels) << p.levels, rows = over(p.height, p.levels) << p.levels;
+        budget.spend(WAVEFRONTS, columns + 3 * rows);
+        budget.spend(SAMPLES, columns * rows);
         supported(Models::registered(p.model), "PYR-1", "the model is not known", p.at);
         need(p.components != 2, "PYR-2", "2 components: they are 1 or 3", p.at);
         need(p.grey <= p.levels && (p.components == 3 || p.grey == p.levels), "PYR-2",
@@ -79,9 +82,6 @@ static void check_plans(const File &f, Budget &budget) {
         need(!p.tile || p.tile >= 6, "PYR-54", "a tile is too small", p.at);
         need(p.details.empty() || p.details.size() == (size_t)p.levels, "PYR-54",
              "details do not fit the levels", p.at);
-        const int64_t columns = over(p.width, p.levels) << p.levels, rows = over(p.height, p.levels) << p.levels;
-        budget.spend(WAVEFRONTS, columns + 3 * rows);
-        budget.spend(SAMPLES, columns * rows);
     }
     std::vector<bool> used(f.plans.size());
     for (const Texr &t : f.textures) {
@@ -222,7 +222,6 @@ static void check_motion(const File &f, Budget &budget) {
         least = layer + 1;
     }
     need((m.size == 0) == m.script.empty(), "MOT-1", "the script and its size do not fit", m.at);
-    budget.spend(METADATA_BYTES, m.size);
     const int64_t coefficients = (int64_t)m.layers.size() * (m.intervals + (m.loop ? 0 : 3));
     budget.check(WAVEFRONTS, coefficients + 2);
     budget.check(MOTION, m.modes * coefficients);

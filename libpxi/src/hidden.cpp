@@ -1,10 +1,8 @@
 #include "hidden.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
-#include "coded.h"
 #include "core.h"
 
 namespace pxi {
@@ -14,25 +12,6 @@ static const int TELLING = 3;    // distance up to which samples tell the colour
 
 void even_out(Components &colours, size_t count) {
     while (colours.size() < count) colours.push_back(colours[0]);
-}
-
-std::vector<uint8_t> sources_of(const Texr &t) {
-    if (t.sources.empty()) return {};
-    const int side = 1 << t.grain, columns = (t.part[2] + side - 1) / side, rows = (t.part[3] + side - 1) / side;
-    const int most = (int)t.offsets.size() / 2, bits = std::bit_width((unsigned)most);
-    const int channels = bits <= 4 ? 1 : 2;
-    std::vector<uint8_t> out =
-        decode_array(t.sources, channels, rows, columns, channels == 1 ? bits : 4, nullptr, t.at);
-    const size_t size = (size_t)rows * columns;
-    for (size_t i = 0; channels == 2 && i < size; i++) out[i] |= (uint8_t)(out[size + i] << 4);
-    out.resize(size);
-    bool any = false;
-    for (const uint8_t source : out) {
-        need(source <= most, "PYR-48", "a source has no offset", t.at);
-        any |= source;
-    }
-    need(any, "PYR-48", "all sources are 0", t.at);
-    return out;
 }
 
 static int32_t whole(float v) { return (int32_t)std::nearbyint(FILL_ONE * v); }
@@ -48,10 +27,9 @@ Components filled(const Texr &t, const Components &own, Mask known, const Behind
         if (other) known[i] = 1;
     }
     const loops::Plane plane = {channels, h, w, values.data(), known.data()};
-    const std::vector<uint8_t> sources = sources_of(t);
-    if (!sources.empty()) {
+    if (!t.copied.empty()) {
         const int side = 1 << t.grain;
-        loops::Copies copies = {plane, known.data(), t.offsets.data(), sources.data(), (h + side - 1) / side,
+        loops::Copies copies = {plane, known.data(), t.offsets.data(), t.copied.data(), (h + side - 1) / side,
                                 (w + side - 1) / side, t.grain, DRIFT, FILL_ONE};
         check_core(core().completed(&copies), t.at);
     }

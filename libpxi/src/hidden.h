@@ -25,7 +25,4 @@ Components filled(const Texr &texr, const Components &own, Mask trusted, const B
 // Replaces components at the edge of a view; `mixed` are those of the raster, without alpha.
 void unmix(const Edge &edge, const Components &mixed, Components &values, int w, int h);
 
-// The offset of each cell of sources, counted from 1; none if there are none at all (PYR-48).
-std::vector<uint8_t> sources_of(const Texr &texr);
-
 }  // namespace pxi

@@ -81,6 +81,8 @@ struct Texr {
     int planes = 0, alpha = 0, cell = 0, behind = 0, behind_alpha = 0, grain = 0, unmix = 0, matte = 0;
     std::array<int, 4> part = {};
     Bytes mask, sources;
+    std::vector<uint8_t> cells;   // of the mask, 0 or 1; none: all
+    std::vector<uint8_t> copied;  // the offset of each cell of sources, counted from 1; none: none at all
     std::vector<int> cuts, offsets;
 };
 

@@ -85,8 +85,7 @@ bool Occlusion::in_place() const {
 }
 
 Mask Occlusion::masked() const {
-    if (texr.mask.empty()) return Mask((int64_t)w * h, 1);
-    return spread(decode_mask(texr.mask, over(h, texr.cell), over(w, texr.cell), "PYR-39", texr.at), texr.cell, w, h);
+    return texr.cells.empty() ? Mask((int64_t)w * h, 1) : spread(texr.cells, texr.cell, w, h);
 }
 
 // Coverage of the part by the boundary that a layer has at rest; computed where there may be any, in
@@ -165,7 +164,7 @@ Masks Occlusion::hard(Mask *lost) const {
     const Mask masked = this->masked();
     const size_t size = masked.size();
     if (texr.cuts.empty()) {
-        if (!texr.mask.empty()) out.shown = out.trusted = masked;
+        if (!texr.cells.empty()) out.shown = out.trusted = masked;
         return out;
     }
     Mask fronts(size), bare(size), open = masked;

@@ -8,6 +8,7 @@
 
 namespace pxi {
 
+static const int MAPS_UNTIL = 3;  // the last version whose payloads may be maps (CON-17)
 static const int64_t K16 = 1 << 16, M16 = 1 << 24, MOST = ((int64_t)1 << 31) - 1, FAR = ((int64_t)1 << 33) - 1;
 
 template <size_t N> static std::array<int, N> fixed(const std::vector<int> &found) {
@@ -138,6 +139,7 @@ static Texr texture_of(Values &v, Place at, int minor) {
     t.at = at;
     const int64_t coder = v.integer("coder", 0, 255);
     supported(coder <= PYRAMID, "CHK-13", "the coder of a texture is not known", at);
+    if (minor > MAPS_UNTIL) v.refuse_map();
     t.coder = (Coder)coder;
     if (t.coder == SHARED) t.texture = (int)v.integer("texture", 0, K16);
     if (t.coder == PYRAMID) view_of(v, t, minor);
@@ -205,7 +207,7 @@ static void read_chunk(File &f, const Chunk &chunk, Budget &budget, bool blocks)
     if (is("uNDO") || is("tREE")) return;
     const bool metadata = is("iCCp") || is("eXIf") || is("xMPd") || is("cICp") || is("iNFO");
     if (metadata && !blocks) return;
-    Values v(chunk.payload, at, f.minor <= 3);
+    Values v(chunk.payload, at, f.minor <= MAPS_UNTIL || is("TEXR"));  // whose coder comes first (CHK-13)
     if (metadata) return read_metadata(f, chunk, v, budget);
     if (is("HEAD")) {
         f.head = head_of(v);
@@ -230,6 +232,21 @@ static void read_chunk(File &f, const Chunk &chunk, Budget &budget, bool blocks)
     v.end();
 }
 
+// The script is looked at, as it may be broken, and then dropped (MOT-1, MOT-10).
+static void check_script(const Motn &m, Budget &budget) {
+    if (!m.size) return;
+    const std::vector<uint8_t> text = decompressed(m.script, m.size, m.at, budget);
+    need(characters(text) >= 0, "MOT-10", "the script is not UTF-8", m.at);
+}
+
+static void decode_textures(File &f) {
+    for (size_t k = 0; k < f.textures.size(); k++) {
+        Texr &t = f.textures[k];
+        if (t.coder == IMPLICIT) decode_codes(t, f.networks[t.network].dim / (f.layers[k].sampling == 1 ? 2 : 1));
+        if (t.coder == PYRAMID) decode_cells(t);
+    }
+}
+
 std::unique_ptr<File> read_file(Bytes data, Budget &budget, bool blocks) {
     auto file = std::make_unique<File>();
     File &f = *file;
@@ -239,10 +256,8 @@ std::unique_ptr<File> read_file(Bytes data, Budget &budget, bool blocks) {
     for (const Chunk &chunk : framed.chunks) read_chunk(f, chunk, budget, blocks);
     check_file(f, budget);
     for (Netw &network : f.networks) decode_network(network);
-    for (size_t k = 0; k < f.textures.size(); k++) {
-        Texr &t = f.textures[k];
-        if (t.coder == IMPLICIT) decode_codes(t, f.networks[t.network].dim / (f.layers[k].sampling == 1 ? 2 : 1));
-    }
+    decode_textures(f);
+    if (f.moves) check_script(f.motion, budget);
     return file;
 }
 

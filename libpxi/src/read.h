@@ -20,6 +20,9 @@ void check_file(const File &file, Budget &budget);
 void decode_network(Netw &network);
 void decode_codes(Texr &texture, int dim);
 
+// Decodes the cells of the mask and of the sources of a view (PYR-39, PYR-48).
+void decode_cells(Texr &view);
+
 // The content of one zstd frame (CHK-16), which has `size` bytes.
 std::vector<uint8_t> decompressed(Bytes frame, int64_t size, Place at, Budget &budget);
 

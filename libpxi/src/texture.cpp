@@ -66,7 +66,6 @@ std::shared_ptr<Shown> Textures::Inner::made(int n, const Scene &scene, const Wa
     const int w = t.part[2], h = t.part[3];
     const Masks masks = Occlusion(file, boundaries, limits, scene, n).masks();
     watch.ask();
-    sources_of(t);  // is refused even if nothing is copied
     Components values = components(t.planes, t.part, watch);
     const bool hides = masks.unmixed || std::find(masks.shown.begin(), masks.shown.end(), 0) != masks.shown.end();
     if (hides) even_out(values, t.behind ? file.plans[t.behind - 1].components : 1);
@@ -130,8 +129,7 @@ bool Textures::in_place(int n, const Scene &scene) const {
 Samples Textures::view(int n, const Scene &scene, Window window) {
     const Texr &t = inner->file.textures[inner->file.source(n)];
     const auto &[x, y, w, h] = t.part;
-    if (!t.alpha && !t.matte && t.mask.empty() && t.cuts.empty()) {  // the raster itself
-        sources_of(t);
+    if (!t.alpha && !t.matte && t.cells.empty() && t.cuts.empty()) {  // the raster itself
         Samples out = raster(t.planes, 0, {y + window.top, y + window.bottom, x + window.left, x + window.right});
         out.at += ((int64_t)y * out.columns + x) * out.channels;
         out.rows = h;

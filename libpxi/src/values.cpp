@@ -12,8 +12,10 @@ Values::Values(Bytes payload, Place at, bool maps) : bytes(payload), at(at) {
     const int first = skip(1)[0];
     need(first >= 0x80 && first <= 0x9f, "CON-14", "the payload is no array of up to 15 values", at);
     map = first < 0x90, count = first & 15;
-    need(!map || maps, "CON-14", "the payload is a map", at);
+    if (!maps) refuse_map();
 }
+
+void Values::refuse_map() const { need(!map, "CON-14", "the payload is a map", at); }
 
 Bytes Values::skip(size_t count) {
     need(count <= bytes.size() - next, "CON-14", "a value runs past the end of its payload", at);
@@ -110,8 +112,7 @@ Bytes Values::binary(const char *name) {
     return skip(length(skip(1)[0], 0, 0, 0xc4, 0xc5));
 }
 
-// Characters of well-formed UTF-8, or -1.
-static int64_t characters(Bytes text) {
+int64_t characters(Bytes text) {
     int64_t count = 0;
     for (size_t i = 0; i < text.size(); count++) {
         const int first = text[i];

@@ -8,6 +8,9 @@
 
 namespace pxi {
 
+// Characters of well-formed UTF-8, or -1.
+int64_t characters(Bytes text);
+
 class Values {
     Bytes bytes;
     Place at;
@@ -29,7 +32,7 @@ class Values {
   public:
     // `maps`: whether the payload may be a map from keys, as in early versions (CON-17).
     Values(Bytes payload, Place at, bool maps);
-    int total() const { return count; }
+    void refuse_map() const;  // which is not allowed after all
 
     // The next value, which has this key and lies in this range.
     int64_t integer(const char *name, int64_t low, int64_t high);

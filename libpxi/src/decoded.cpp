@@ -1,4 +1,4 @@
-// Networks of the file, and planes of codes of implicit textures (chapter 7).
+// Networks of the file, planes of codes of implicit textures (chapter 7), and cells of views.
 #include <bit>
 #include <cmath>
 
@@ -63,6 +63,26 @@ void decode_codes(Texr &t, int dim) {
         const float scale = steps[f] / FRACTION;
         for (int64_t i = 0; i < size; i++) t.features[i * dim + f] = (float)value[i] * scale;
     }
+}
+
+void decode_cells(Texr &t) {
+    const auto cells = [&](int size, int log2) { return (size + (1 << log2) - 1) >> log2; };
+    if (!t.mask.empty())
+        t.cells = decode_mask(t.mask, cells(t.part[3], t.cell), cells(t.part[2], t.cell), "PYR-39", t.at);
+    if (t.sources.empty()) return;
+    const int columns = cells(t.part[2], t.grain), rows = cells(t.part[3], t.grain);
+    const int most = (int)t.offsets.size() / 2, bits = std::bit_width((unsigned)most);
+    const int channels = bits <= 4 ? 1 : 2;
+    t.copied = decode_array(t.sources, channels, rows, columns, channels == 1 ? bits : 4, nullptr, t.at);
+    const size_t size = (size_t)rows * columns;
+    for (size_t i = 0; channels == 2 && i < size; i++) t.copied[i] |= (uint8_t)(t.copied[size + i] << 4);
+    t.copied.resize(size);
+    bool any = false;
+    for (const uint8_t source : t.copied) {
+        need(source <= most, "PYR-48", "a source has no offset", t.at);
+        any |= source;
+    }
+    need(any, "PYR-48", "all sources are 0", t.at);
 }
 
 }  // namespace pxi
