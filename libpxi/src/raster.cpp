@@ -2,32 +2,50 @@
 
 #include <cmath>
 
+#include "parallel.h"
+
 namespace pxi {
 
 static const int STEP_ORIGIN = 293;
 static const int AROUND = 3;   // positions around a window that its synthesis depends on
-static const int STRIP = 256;  // rows that are made at once, which bounds memory
+static const int STRIP_MIN = 64, STRIP = 256;  // rows that a thread makes at once, which bounds memory
 
 Raster::Raster(const Plan &plan, const Weights &weights, const Watch &watch)
     : plan(plan), weights(weights), watch(watch), grid(plan), latents(plan, weights, watch) {}
 
+// Makes a window in strips of rows, on several threads; each strip costs some rows more.
+template <class Make> void Raster::strips(Window part, Make make) const {
+    const int threads = watch.threads;
+    const int rows = std::clamp((part.rows() + threads - 1) / threads, STRIP_MIN, STRIP);
+    parallel(threads, (part.rows() + rows - 1) / rows, [&](int64_t k) {
+        const int top = part.top + (int)k * rows;
+        make(Window{top, std::min(top + rows, part.bottom), part.left, part.right});
+    });
+}
+
+Raster::Inputs Raster::inputs(int level, Window window) {
+    const Window above = window.halved().grown(AROUND, grid.at(level + 1));
+    const int32_t *high = latents.level(level + 1, above);
+    return {high, low(level + 1, above)};
+}
+
 // Makes planes above a level, [rows][columns][3] of a window that holds the one that is asked for.
-std::vector<float> Raster::finer(int level, Window window, Window *under) {
+std::vector<float> Raster::finer(int level, const Inputs &from, Window window, Window *under) const {
     const Shape coarser = grid.at(level + 1);
     const Window above = window.halved().grown(AROUND, coarser);
     *under = above.doubled(grid.at(level));
-    const std::vector<int32_t> high = cut(latents.level(level + 1, above), 9, coarser, above);
-    const std::vector<float> planes = cut(low(level + 1, above), 1, coarser, above, 3);
+    const std::vector<int32_t> high = cut(from.high, 9, coarser, above);
+    const std::vector<float> planes = cut(from.low, 1, coarser, above, 3);
     const Synthetic &w = weights.synthesis_of(level + 1);
     const float t = (float)(plan.step - STEP_ORIGIN) / 128;
     std::vector<float> gain(9), bias = w.first_bias, out(3 * under->shape().size());
     for (int k = 0; k < 9; k++) gain[k] = (float)std::exp((double)(w.gain[k] + w.gain_by_step[k] * t));
     for (size_t i = 0; i < bias.size(); i++) bias[i] += w.first_by_step[i] * t;
-    const Listening hearing(watch);
+    const Listening listening(watch);
     const loops::Synthesis task = {w.linear.data(), w.first.data(), bias.data(), w.second.data(),
                                    w.second_bias.data(), w.third.data(), w.third_bias.data(), gain.data(),
                                    weights.hidden, above.rows(), above.columns(), under->rows(), under->columns(),
-                                   planes.data(), high.data(), out.data(), hearing.function()};
+                                   planes.data(), high.data(), out.data(), listening.function()};
     check_core(core().pyramid_synthesis(&task), plan.at);
     return out;
 }
@@ -46,12 +64,12 @@ const float *Raster::low(int level, Window window) {
     }
     if (!own.planes) own.planes.make(3 * shape.size()), own.made = Made(shape);
     for (const Window &part : own.made.lacking(window)) {
-        for (Window strip = part; strip.top < part.bottom; strip.top = strip.bottom) {
-            strip.bottom = std::min(strip.top + STRIP, part.bottom);
+        const Inputs from = inputs(level, part);
+        strips(part, [&](Window strip) {
             Window under;
-            const std::vector<float> found = finer(level, strip, &under);
+            const std::vector<float> found = finer(level, from, strip, &under);
             paste(found.data(), under.shape(), strip.inside(under), own.planes.data(), shape, strip, 1, 3);
-        }
+        });
         own.made.add(part);
     }
     return own.planes.data();
@@ -69,20 +87,26 @@ static std::vector<double> evenly(const Synthetic &w) {
     return out;
 }
 
-// Samples of a window of planes above a level, which begin at `planes`, in rows of `stride` numbers.
-void Raster::colour(int level, const float *planes, int64_t stride, float *out, Shape shape, Window at) {
-    std::vector<float> matrix = weights.to_colour;
+// Weights [3][3] of planes above a level in colours of 0..255.
+std::vector<float> Raster::matrix(int level) const {
+    std::vector<float> out = weights.to_colour;
     for (int k = 1; k <= level; k++) {
         const std::vector<double> factors = evenly(weights.synthesis_of(k));
         std::vector<float> next(9);
         for (int i = 0; i < 9; i++) {
             double sum = 0;
-            for (int j = 0; j < 3; j++) sum += matrix[i / 3 * 3 + j] * factors[3 * j + i % 3];
+            for (int j = 0; j < 3; j++) sum += out[i / 3 * 3 + j] * factors[3 * j + i % 3];
             next[i] = (float)sum;
         }
-        matrix = next;
+        out = next;
     }
-    for (float &weight : matrix) weight *= (float)std::exp2(plan.step / 64.);
+    for (float &weight : out) weight *= (float)std::exp2(plan.step / 64.);
+    return out;
+}
+
+// Samples of a window, whose planes begin at `planes`, in rows of `stride` numbers.
+void Raster::colour(const std::vector<float> &matrix, const float *planes, int64_t stride, float *out, Shape shape,
+                    Window at) const {
     const int components = plan.components;
     std::vector<float> row(3 * (size_t)at.columns());
     for (int y = at.top; y < at.bottom; y++, planes += stride) {
@@ -100,21 +124,17 @@ const float *Raster::samples(int level, Window window) {
     const Shape wanted = shape(level);
     Level &own = coloured[level];
     if (!own.planes) own.planes.make(wanted.size() * plan.components), own.made = Made(wanted);
+    const std::vector<float> weights = matrix(level);
     for (const Window &part : own.made.lacking(window)) {
-        for (Window strip = part; strip.top < part.bottom; strip.top = strip.bottom) {
-            strip.bottom = std::min(strip.top + STRIP, part.bottom);
-            if (level == 0) {
-                Window under;
-                const std::vector<float> found = finer(0, strip, &under);
-                const Window at = strip.inside(under);
-                const int64_t stride = 3 * (int64_t)under.columns();
-                colour(0, found.data() + at.top * stride + 3 * at.left, stride, own.planes.data(), wanted, strip);
-            } else {
-                const int64_t stride = 3 * (int64_t)wanted.columns;
-                const float *planes = low(level, strip) + strip.top * stride + 3 * strip.left;
-                colour(level, planes, stride, own.planes.data(), wanted, strip);
-            }
-        }
+        const Inputs from = level ? Inputs{nullptr, low(level, part)} : inputs(0, part);
+        strips(part, [&](Window strip) {
+            std::vector<float> found;
+            Window under = Window::whole(wanted), at = strip;
+            if (level == 0) found = finer(0, from, strip, &under), at = strip.inside(under);
+            const int64_t stride = 3 * (int64_t)under.columns();
+            const float *planes = (level ? from.low : found.data()) + at.top * stride + 3 * at.left;
+            colour(weights, planes, stride, own.planes.data(), wanted, strip);
+        });
         own.made.add(part);
     }
     if (level == 0 && own.made.whole()) latents.forget();

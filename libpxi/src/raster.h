@@ -18,9 +18,18 @@ class Raster {
     std::map<int, Level> lows;       // planes above a level
     std::map<int, Level> coloured;   // samples [h][w][components] without so many levels
 
-    std::vector<float> finer(int level, Window window, Window *under);
+    // Planes of a level [9][h][w] and [h][w][3], which give the next finer planes.
+    struct Inputs {
+        const int32_t *high;
+        const float *low;
+    };
+    Inputs inputs(int level, Window window);
+    std::vector<float> finer(int level, const Inputs &from, Window window, Window *under) const;
     const float *low(int level, Window window);
-    void colour(int level, const float *planes, int64_t stride, float *out, Shape shape, Window at);
+    template <class Make> void strips(Window part, Make make) const;
+    std::vector<float> matrix(int level) const;
+    void colour(const std::vector<float> &matrix, const float *planes, int64_t stride, float *out, Shape shape,
+                Window at) const;
 
   public:
     Raster(const Plan &plan, const Weights &weights, const Watch &watch);

@@ -39,7 +39,9 @@ class Progress {
 struct Heard {
     Textures &textures;
     const Watch before;
-    Heard(Textures &t, Progress &progress) : textures(t), before(t.watch) { t.watch = {Progress::decoding, &progress}; }
+    Heard(Textures &t, Progress &progress, int threads) : textures(t), before(t.watch) {
+        t.watch = {Progress::decoding, &progress, threads};
+    }
     ~Heard() { textures.watch = before; }
 };
 
@@ -147,7 +149,7 @@ void render(Image &image, const Request &request, const Put &put, const Told &to
     budget.spend(OUTPUT_PIXELS, (int64_t)view.width * view.height);
     budget.spend(MULTIPLY_ADDS, (int64_t)request.drawn.size() * view.columns() * view.rows() * SAMPLE_COST);
     Progress progress(told);
-    const Heard heard(*image.textures, progress);
+    const Heard heard(*image.textures, progress, request.threads);
     Canvas canvas{image, request, {}, {}, {}, {}};
     const size_t count = image.file->layers.size();
     canvas.scene = {std::vector<uint8_t>(count), request.moving}, canvas.seen.resize(count);
