@@ -10,7 +10,7 @@
  * leaves the library, and there is no global state: different files may be used by different
  * threads at once, one file by one thread at a time.
  *
- * Structures begin with `size`, which a caller sets to what sizeof tells: fields that are added
+ * Structures begin with `size`, which a caller sets to what sizeof tells (PXI_..._INIT does): fields that are added
  * later come at the end, and a caller that was compiled before them gets their defaults, which are
  * zeros. Constants and fields never change their meaning while PXI_ABI stays the same.
  */
@@ -114,6 +114,7 @@ typedef struct pxi_info {
     uint32_t loop;          /* 1 if the motion repeats */
     uint32_t primaries, transfer; /* colour by the code points of ITU-T H.273; 0: not said, sRGB */
 } pxi_info;
+#define PXI_INFO_INIT {sizeof(pxi_info), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}
 
 PXI_API pxi_status pxi_describe(const pxi_file *file, pxi_info *info, pxi_error *error);
 
@@ -126,6 +127,7 @@ typedef struct pxi_layer {
     int32_t x, y;        /* the rectangle of its texture at rest, in canvas pixels */
     uint32_t width, height;
 } pxi_layer;
+#define PXI_LAYER_INIT {sizeof(pxi_layer), 0, 0, 0, NULL, 0, 0, 0, 0}
 
 /* Layer `number`, counted from 0 from back to front. */
 PXI_API pxi_status pxi_describe_layer(const pxi_file *file, uint32_t number, pxi_layer *layer, pxi_error *error);
@@ -136,6 +138,7 @@ typedef struct pxi_metadata {
     size_t count;
     const void *bytes;  /* as long as the file is open */
 } pxi_metadata;
+#define PXI_METADATA_INIT {sizeof(pxi_metadata), {0}, 0, NULL}
 
 /* Block `number` of the metadata. The blocks of a file that is otherwise sound may be damaged. */
 PXI_API pxi_status pxi_describe_metadata(const pxi_file *file, uint32_t number, pxi_metadata *block, pxi_error *error);
@@ -175,6 +178,7 @@ typedef struct pxi_output {
     size_t row_bytes; /* least bytes of a row */
     size_t bytes;     /* least bytes of a buffer whose rows follow each other */
 } pxi_output;
+#define PXI_OUTPUT_INIT {sizeof(pxi_output), 0, 0, 0, 0, 0}
 
 /* Checks a request, and tells what it makes. `request` may be null: the canvas at its own size. */
 PXI_API pxi_status pxi_measure(const pxi_file *file, const pxi_request *request, pxi_output *output,

@@ -3,7 +3,6 @@
 #ifndef PXI_NO_THREADS
 #include <atomic>
 #include <exception>
-#include <system_error>
 #include <thread>
 #include <vector>
 #endif
@@ -33,7 +32,7 @@ void parallel(int threads, int64_t count, const std::function<void(int64_t)> &wo
     for (int k = 1; k < threads && k < count; k++) {
         try {
             others.emplace_back(run);
-        } catch (const std::system_error &) {  // there are no more: fewer do it
+        } catch (const std::exception &) {  // there are no more, or no memory for one: fewer do it
             break;
         }
     }

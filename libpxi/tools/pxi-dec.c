@@ -21,7 +21,7 @@ typedef struct {
 } Command;
 
 static int wrong(const char *message, const char *what) {
-    fprintf(stderr, "pxi-dec: %s%s\n%s", message, what, USAGE);
+    fprintf(stderr, "pxi-dec: %s: %s\n%s", message, what, USAGE);
     return PXI_USAGE;
 }
 
@@ -45,39 +45,41 @@ static int region_of(const char *text, pxi_request *request) {
     return end && !text[end] && request->region_width && request->region_height;
 }
 
-/* Takes a flag with its value; returns an error message, or null. */
+/* Takes a flag with its value; returns what is wrong with that, "" if there is no such flag, or null. */
 static const char *flag(Command *c, const char *name, const char *value) {
     pxi_request *r = &c->request;
-    if (!strcmp(name, "--width")) return (r->width = count_of(value)) ? NULL : "not a number of pixels: ";
-    if (!strcmp(name, "--height")) return (r->height = count_of(value)) ? NULL : "not a number of pixels: ";
-    if (!strcmp(name, "--scale")) return number_of(value, &r->scale) && r->scale > 0 ? NULL : "not a scale: ";
-    if (!strcmp(name, "--region")) return region_of(value, r) ? NULL : "not a region: ";
-    if (!strcmp(name, "--time")) return r->moving = 1, number_of(value, &r->time) ? NULL : "not a time: ";
-    if (!strcmp(name, "--threads")) return (r->threads = count_of(value)) ? NULL : "not a number of threads: ";
+    if (!strcmp(name, "--width")) return (r->width = count_of(value)) ? NULL : "not a number of pixels";
+    if (!strcmp(name, "--height")) return (r->height = count_of(value)) ? NULL : "not a number of pixels";
+    if (!strcmp(name, "--scale")) return number_of(value, &r->scale) && r->scale > 0 ? NULL : "not a scale";
+    if (!strcmp(name, "--region")) return region_of(value, r) ? NULL : "not a region";
+    if (!strcmp(name, "--time")) return r->moving = 1, number_of(value, &r->time) ? NULL : "not a time";
+    if (!strcmp(name, "--threads")) return (r->threads = count_of(value)) ? NULL : "not a number of threads";
     if (!strcmp(name, "--layer")) return c->layers[c->layer_count++] = value, NULL;
-    if (strcmp(name, "--bit-depth")) return "there is no such flag, or it has a value too many: ";
+    if (strcmp(name, "--bit-depth")) return "";
     c->bits = atoi(value);
-    return !strcmp(value, "8") || !strcmp(value, "16") ? NULL : "the bit depth is 8 or 16, not ";
+    return !strcmp(value, "8") || !strcmp(value, "16") ? NULL : "neither 8 nor 16";
 }
 
 static int parse(Command *c, int count, char **words) {
     for (int i = 1; i < count; i++) {
         char *word = words[i], *value = strchr(word, '=');
-        if (!strcmp(word, "--no-background")) c->request.without_background = 1;
-        else if (!strcmp(word, "--list")) c->list = 1;
-        else if (strncmp(word, "--", 2)) {
-            if (c->out) return wrong("what is this? ", word);
+        const char *problem;
+        if (!strcmp(word, "--no-background")) {
+            c->request.without_background = 1;
+        } else if (!strcmp(word, "--list")) {
+            c->list = 1;
+        } else if (strncmp(word, "--", 2)) {
+            if (c->out) return wrong("a file too many", word);
             *(c->in ? &c->out : &c->in) = word;
         } else {
-            const char *problem;
             if (value) *value++ = 0;
-            else if (i + 1 < count) value = words[++i];
-            else return wrong("a flag without its value, or unknown: ", word);
+            else value = i + 1 < count ? words[++i] : NULL;
+            if (!value) return wrong("no such flag, or it lacks its value", word);
             problem = flag(c, word, value);
-            if (problem) return wrong(problem, problem[0] == 't' && problem[2] == 'e' && problem[3] == 'r' ? word : value);
+            if (problem) return *problem ? wrong(problem, value) : wrong("no such flag", word);
         }
     }
-    return c->in && c->list == !c->out ? 0 : wrong("one file to read, and one to write, are needed", "");
+    return c->in && c->list == !c->out ? 0 : wrong("files are missing", c->list ? "IN" : "IN and OUT");
 }
 
 static void *read_whole(const char *path, size_t *size) {
@@ -99,7 +101,7 @@ static void *read_whole(const char *path, size_t *size) {
 
 /* Numbers of the layers that were asked for, by name or position. */
 static int find_layers(pxi_file *file, Command *c, uint32_t *numbers, pxi_error *error) {
-    pxi_info info = {sizeof info, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+    pxi_info info = PXI_INFO_INIT;
     if (pxi_describe(file, &info, error)) return (int)error->status;
     for (size_t i = 0; i < c->layer_count; i++) {
         const char *key = c->layers[i], *digits = key + (*key == '-');
@@ -109,22 +111,22 @@ static int find_layers(pxi_file *file, Command *c, uint32_t *numbers, pxi_error 
             k = *key == '-' ? info.layers - (uint32_t)atol(digits) : (uint32_t)atol(key);
         else
             for (; k < info.layers; k++) {
-                pxi_layer layer = {sizeof layer, 0, 0, 0, NULL, 0, 0, 0, 0};
+                pxi_layer layer = PXI_LAYER_INIT;
                 if (pxi_describe_layer(file, k, &layer, error)) return (int)error->status;
                 if (layer.name_bytes == strlen(key) && !memcmp(layer.name, key, layer.name_bytes)) break;
             }
-        if (k >= info.layers) return wrong("there is no layer ", key);
+        if (k >= info.layers) return wrong("there is no such layer", key);
         numbers[i] = k;
     }
     return 0;
 }
 
 static int list(pxi_file *file, pxi_error *error) {
-    pxi_info info = {sizeof info, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+    pxi_info info = PXI_INFO_INIT;
     if (pxi_describe(file, &info, error)) return (int)error->status;
     printf("%ux%u, %u layers%s", info.width, info.height, info.layers, info.duration ? ", moving\n" : "\n");
     for (uint32_t k = 0; k < info.layers; k++) {
-        pxi_layer layer = {sizeof layer, 0, 0, 0, NULL, 0, 0, 0, 0};
+        pxi_layer layer = PXI_LAYER_INIT;
         if (pxi_describe_layer(file, k, &layer, error)) return (int)error->status;
         printf("%u ", k);
         for (uint32_t i = 0; i < layer.name_bytes; i++) {  /* names may hold anything */
@@ -148,7 +150,7 @@ static int write_png(const char *path, const void *pixels, const pxi_output *out
 }
 
 static int decode(pxi_file *file, Command *c, pxi_error *error) {
-    pxi_output output = {sizeof output, 0, 0, 0, 0, 0};
+    pxi_output output = PXI_OUTPUT_INIT;
     uint32_t *numbers = malloc((c->layer_count + 1) * sizeof *numbers);
     void *pixels = NULL;
     int status = numbers ? find_layers(file, c, numbers, error) : PXI_MEMORY;
