@@ -46,7 +46,7 @@ void check_core(int wrong, Place at) {
     need(wrong != ESCAPES_END, "PYR-13", "the list of escapes is cut off or corrupt", at);
     need(wrong != OUT_OF_RANGE, "PYR-12", "a latent is out of range", at);
     if (wrong == STOPPED) fail(Kind::STOPPED, "", "the caller asked to stop");
-    if (wrong) fail(Kind::LIMIT, "", "there is not enough memory");
+    if (wrong) out_of_memory();
 }
 
 }  // namespace pxi

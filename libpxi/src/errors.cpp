@@ -1,5 +1,6 @@
 #include "errors.h"
 
+#include <new>
 #include <utility>
 
 namespace pxi {
@@ -8,6 +9,7 @@ namespace pxi {
 void fail(Kind kind, const char *rule, std::string message, Place at) {
     throw Failure{kind, rule, std::move(message), at};
 }
+void out_of_memory() { throw std::bad_alloc(); }
 #else
 // The host of a WebAssembly module: it takes note, and gives the instance up.
 extern "C" [[noreturn]] void pxi_failed(int kind, const char *rule, const char *message, const char *chunk,
@@ -15,6 +17,7 @@ extern "C" [[noreturn]] void pxi_failed(int kind, const char *rule, const char *
 void fail(Kind kind, const char *rule, std::string message, Place at) {
     pxi_failed((int)kind, rule, message.c_str(), at.chunk, at.offset);
 }
+void out_of_memory() { fail(Kind::LIMIT, "", "there is not enough memory"); }
 #endif
 
 }  // namespace pxi

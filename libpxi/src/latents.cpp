@@ -1,6 +1,7 @@
 #include "latents.h"
 
 #include "latent_tables.h"
+#include "parallel.h"
 
 namespace pxi {
 
@@ -111,24 +112,38 @@ const int32_t *Latents::level(int level, Window window) {
     index();
     std::vector<Tile> wanted, left;
     for (const Tile &tile : tiles[level]) (tile.at.meets(window) ? wanted : left).push_back(tile);
-    for (const Tile &tile : wanted) read_tile(level, tile);
+    read_tiles(level, wanted);
     tiles[level] = std::move(left);
     return levels[level].data();
 }
 
-void Latents::read_tile(int level, const Tile &tile) {
-    const Shape shape = grid.at(level), coarser = level < grid.levels ? grid.at(level + 1)
-                                                                     : Shape{(shape.rows + 1) / 2, (shape.columns + 1) / 2};
-    const Window outer = tile.at.grown(REACH, shape);
-    const std::vector<int32_t> parent = cut(this->level(level + 1, outer.halved()), 9, coarser, outer.halved());
-    const std::vector<int32_t> low = cut(plain(level, outer), 3, shape, outer);
-    std::vector<uint8_t> some(outer.shape().size());
-    paste(bands(level).data(), shape, tile.at, some.data(), outer.shape(), tile.at.inside(outer), 1);
-    std::vector<int32_t> found(9 * outer.shape().size());
-    LatentStream stream(tile.data, tile.escapes, plan.at);
-    decode(stream, level, outer.shape(), low.data(), parent.data(), some.data(), found.data());
-    stream.finish();
-    paste(found.data(), outer.shape(), tile.at.inside(outer), levels[level].data(), shape, tile.at, 9);
+// Decodes tiles, on several threads.
+void Latents::read_tiles(int level, const std::vector<Tile> &wanted) {
+    if (wanted.empty()) return;
+    const Shape shape = grid.at(level);
+    const bool coarsest = level == grid.levels;
+    const Shape coarser = coarsest ? Shape{(shape.rows + 1) / 2, (shape.columns + 1) / 2} : grid.at(level + 1);
+    Window all = wanted[0].at;
+    for (const Tile &tile : wanted)
+        all = {std::min(all.top, tile.at.top), std::max(all.bottom, tile.at.bottom),
+               std::min(all.left, tile.at.left), std::max(all.right, tile.at.right)};
+    all = all.grown(REACH, shape);
+    const int32_t *low = plain(level, all), *parent = this->level(level + 1, all.halved());
+    const uint8_t *coded = bands(level).data();
+    int32_t *out = levels[level].data();
+    parallel(watch.threads, (int64_t)wanted.size(), [&](int64_t k) {
+        const Tile &tile = wanted[k];
+        const Window outer = tile.at.grown(REACH, shape);
+        const std::vector<int32_t> above = cut(parent, 9, coarser, outer.halved());
+        const std::vector<int32_t> own = cut(low, 3, shape, outer);
+        std::vector<uint8_t> some(outer.shape().size());
+        paste(coded, shape, tile.at, some.data(), outer.shape(), tile.at.inside(outer), 1);
+        std::vector<int32_t> found(9 * outer.shape().size());
+        LatentStream stream(tile.data, tile.escapes, plan.at);
+        decode(stream, level, outer.shape(), own.data(), above.data(), some.data(), found.data());
+        stream.finish();
+        paste(found.data(), outer.shape(), tile.at.inside(outer), out, shape, tile.at, 9);
+    });
 }
 
 // Escapes and streams of all tiles, one after the other.

@@ -62,7 +62,7 @@ class Latents {
     void decode(LatentStream &stream, int level, Shape shape, const int32_t *low, const int32_t *parent,
                 const uint8_t *bands, int32_t *out) const;
     void read_level(int level);
-    void read_tile(int level, const Tile &tile);
+    void read_tiles(int level, const std::vector<Tile> &wanted);
     void index();
     std::vector<Tile> split() const;
 

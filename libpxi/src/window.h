@@ -5,8 +5,9 @@
 #include <cstdint>
 #include <cstdlib>
 #include <memory>
-#include <new>
 #include <vector>
+
+#include "errors.h"
 
 namespace pxi {
 
@@ -56,13 +57,7 @@ template <class T> class Zeros {
   public:
     void make(int64_t count) {
         items.reset((T *)std::calloc((size_t)count, sizeof(T)));
-        if (!items) {
-#if __cpp_exceptions
-            throw std::bad_alloc();
-#else
-            std::abort();
-#endif
-        }
+        if (!items) out_of_memory();
     }
     void clear() { items.reset(); }
     explicit operator bool() const { return (bool)items; }

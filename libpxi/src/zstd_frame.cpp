@@ -16,7 +16,7 @@ std::vector<uint8_t> decompressed(Bytes frame, int64_t size, Place at, Budget &b
     budget.spend(METADATA_BYTES, size);
     need(frame.size() >= 4 && !std::memcmp(frame.data(), MAGIC, 4), "CHK-16", "metadata is not a zstd frame", at);
     const std::unique_ptr<ZSTD_DCtx, size_t (*)(ZSTD_DCtx *)> context(ZSTD_createDCtx(), ZSTD_freeDCtx);
-    if (!context) fail(Kind::LIMIT, "", "there is not enough memory");
+    if (!context) out_of_memory();
     ZSTD_DCtx_setParameter(context.get(), ZSTD_d_windowLogMax, WINDOW_LOG_MAX);
     std::vector<uint8_t> out((size_t)size + 1);
     ZSTD_inBuffer in = {frame.data(), frame.size(), 0};
@@ -28,6 +28,7 @@ std::vector<uint8_t> decompressed(Bytes frame, int64_t size, Place at, Budget &b
         if (ZSTD_isError(left)) {
             if (ZSTD_getErrorCode(left) == ZSTD_error_frameParameter_windowTooLarge)
                 fail(Kind::LIMIT, "SEC-6", "the zstd frame needs too large a window", at);
+            if (ZSTD_getErrorCode(left) == ZSTD_error_memory_allocation) out_of_memory();
             fail(Kind::INVALID, "CHK-16", "metadata is not a zstd frame", at);
         }
         if (in.pos + to.pos == before) break;
