@@ -14,7 +14,7 @@ fn main() {
         }
         pxi::pxi_close(file);
     }
-    if error.status != 0 { eprintln!("{}", String::from_utf8_lossy(&error.message)); std::process::exit(1) }
+    if error.status != 0 { eprintln!("{}", String::from_utf8_lossy(&error.message).trim_end_matches('\0')); std::process::exit(1) }
     print!("P6 {} {} 255\n", output.width, output.height);
     pixels.chunks(4).for_each(|pixel| std::io::stdout().write_all(&pixel[..3]).expect("standard output"));
 }

@@ -1,9 +1,60 @@
-// Fuzz target of libFuzzer: opens any bytes, and draws them small, whole or in part, as the last bytes say.
+// Fuzz target of libFuzzer: opens any bytes, and draws them small, whole or in part, as the last byte says. Its mutator
+// changes payloads of chunks, and puts lengths and checksums right, most of the time.
+#include <algorithm>
 #include <cstdint>
 #include <cstdlib>
+#include <cstring>
 #include <vector>
 
 #include "pxi.h"
+
+extern "C" size_t LLVMFuzzerMutate(uint8_t *data, size_t size, size_t most);
+
+namespace {
+
+constexpr size_t PREFIX = 12, FRAME = 12;  // bytes before the first chunk; of a chunk without its payload
+
+uint32_t checksum(const uint8_t *bytes, size_t count) {
+    uint32_t crc = ~0u;
+    for (size_t i = 0; i < count; i++) {
+        crc ^= bytes[i];
+        for (int k = 0; k < 8; k++) crc = crc & 1 ? 0xEDB88320u ^ crc >> 1 : crc >> 1;
+    }
+    return ~crc;
+}
+
+// Places of the chunks that are whole.
+std::vector<size_t> chunks_of(const uint8_t *data, size_t size) {
+    std::vector<size_t> found;
+    for (size_t at = PREFIX; at + FRAME <= size;) {
+        uint32_t length;
+        std::memcpy(&length, data + at + 4, 4);
+        if (length > size - at - FRAME) break;
+        found.push_back(at), at += FRAME + length;
+    }
+    return found;
+}
+
+}  // namespace
+
+extern "C" size_t LLVMFuzzerCustomMutator(uint8_t *data, size_t size, size_t most, unsigned seed) {
+    const std::vector<size_t> chunks = chunks_of(data, size);
+    if (seed % 16 == 0 || chunks.empty()) return LLVMFuzzerMutate(data, size, most);
+    const size_t at = chunks[seed / 16 % chunks.size()];
+    uint32_t length;
+    std::memcpy(&length, data + at + 4, 4);
+    const size_t behind = size - at - FRAME - length, room = std::min<size_t>(most - size + length, length + 64);
+    if (size > most || !room) return LLVMFuzzerMutate(data, size, most);
+    std::vector<uint8_t> payload(data + at + 8, data + at + 8 + length), rest(data + size - behind, data + size);
+    payload.resize(room);
+    length = (uint32_t)std::min(LLVMFuzzerMutate(payload.data(), length, room), room);
+    std::memcpy(data + at + 4, &length, 4);
+    std::copy_n(payload.data(), length, data + at + 8);
+    const uint32_t crc = checksum(data + at, 8 + length);
+    std::memcpy(data + at + 8 + length, &crc, 4);
+    std::copy(rest.begin(), rest.end(), data + at + FRAME + length);
+    return at + FRAME + length + rest.size();
+}
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     // Small limits: what is wrong shows in small pictures, too.

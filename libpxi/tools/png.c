@@ -10,19 +10,20 @@
 typedef struct {
     FILE *to;
     uint32_t crc;
-    uint32_t table[256];
 } Writer;
 
-static void begin(Writer *w) {
-    for (uint32_t i = 0; i < 256; i++) {
-        w->table[i] = i;
-        for (int k = 0; k < 8; k++) w->table[i] = w->table[i] & 1 ? 0xEDB88320u ^ w->table[i] >> 1 : w->table[i] >> 1;
+#ifndef PXI_ZLIB
+static uint32_t crc32(uint32_t crc, const uint8_t *bytes, size_t count) {
+    for (crc = ~crc; count--; bytes++) {
+        crc ^= *bytes;
+        for (int k = 0; k < 8; k++) crc = crc & 1 ? 0xEDB88320u ^ crc >> 1 : crc >> 1;
     }
+    return ~crc;
 }
+#endif
 
 static void put(Writer *w, const void *bytes, size_t count) {
-    const uint8_t *b = bytes;
-    for (size_t i = 0; i < count; i++) w->crc = w->table[(w->crc ^ b[i]) & 255] ^ w->crc >> 8;
+    w->crc = (uint32_t)crc32(w->crc, bytes, count);
     fwrite(bytes, 1, count, w->to);
 }
 
@@ -34,9 +35,9 @@ static void chunk(Writer *w, const char *kind, const void *bytes, uint32_t count
     uint8_t word[4];
     number(word, count);
     fwrite(word, 1, 4, w->to);
-    w->crc = ~0u;
+    w->crc = 0;
     put(w, kind, 4), put(w, bytes, count);
-    number(word, ~w->crc);
+    number(word, w->crc);
     fwrite(word, 1, 4, w->to);
 }
 
@@ -110,9 +111,8 @@ static int pack(Writer *w, const uint8_t *pixels, uint32_t width, uint32_t heigh
 #endif
 
 int png_write(FILE *to, const void *pixels, uint32_t width, uint32_t height, int bits, int channels) {
-    Writer w = {to, 0, {0}};
+    Writer w = {to, 0};
     uint8_t head[13];
-    begin(&w);
     fwrite("\x89PNG\r\n\x1a\n", 1, 8, to);
     number(head, width), number(head + 4, height);
     head[8] = (uint8_t)bits, head[9] = channels == 4 ? 6 : 2, head[10] = head[11] = head[12] = 0;

@@ -164,26 +164,30 @@ static int decode(pxi_file *file, Command *c, pxi_error *error) {
     return status;
 }
 
-int main(int count, char **words) {
-    Command c = {NULL, NULL, NULL, 0, 0, 8, PXI_REQUEST_INIT};
-    pxi_error error = PXI_ERROR_INIT;
+static int run(Command *c, pxi_error *error) {
+    size_t size;
     pxi_file *file = NULL;
-    size_t size = 0;
-    void *bytes;
+    void *bytes = read_whole(c->in, &size);
     int status;
-    if (!(c.layers = malloc((size_t)count * sizeof *c.layers))) return PXI_LIMIT;
-    status = parse(&c, count, words);
-    if (!status && !(bytes = read_whole(c.in, &size))) {
-        fprintf(stderr, "pxi-dec: %s: %s\n", c.in, strerror(errno));
-        status = PXI_IO;
-    } else if (!status) {
-        status = (int)pxi_open(bytes, size, NULL, &file, &error);
-        free(bytes);
-        if (!status) status = c.list ? list(file, &error) : decode(file, &c, &error);
-        if (status && error.status)
-            fprintf(stderr, "pxi-dec: %s: %s%s%s\n", c.in, error.message, *error.rule ? ", rule " : "", error.rule);
-        pxi_close(file);
+    if (!bytes) {
+        fprintf(stderr, "pxi-dec: %s: %s\n", c->in, strerror(errno));
+        return PXI_IO;
     }
-    free(c.layers);
+    status = (int)pxi_open(bytes, size, NULL, &file, error);
+    free(bytes);
+    if (!status) status = c->list ? list(file, error) : decode(file, c, error);
+    if (error->status) fprintf(stderr, "pxi-dec: %s: %s%s%s\n", c->in, error->message, *error->rule ? ", rule " : "", error->rule);
+    else if (status == PXI_MEMORY) fprintf(stderr, "pxi-dec: %s: there is not enough memory\n", c->in);
+    pxi_close(file);
     return status == PXI_MEMORY ? PXI_LIMIT : status;
+}
+
+int main(int count, char **words) {
+    Command c = {NULL, NULL, malloc((size_t)count * sizeof(char *)), 0, 0, 8, PXI_REQUEST_INIT};
+    pxi_error error = PXI_ERROR_INIT;
+    int status = PXI_LIMIT;
+    if (!c.layers) fputs("pxi-dec: there is not enough memory\n", stderr);
+    else if (!(status = parse(&c, count, words))) status = run(&c, &error);
+    free(c.layers);
+    return status;
 }
