@@ -163,8 +163,7 @@ static void spend_view(const Texr &t, int k, Budget &budget) {
     if (!t.mask.empty() || !t.cuts.empty() || t.matte) budget.spend(FILLED, (t.sources.empty() ? 1 : 2) * w * h);
     if (!t.cuts.empty()) {
         const int64_t layers = (int64_t)t.cuts.size() + (t.cuts[0] == k ? k : 0);
-        budget.check(COVERED, w * h);
-        budget.spend(COVERED, w * h * layers);
+        budget.spend(COVERED, std::min(w * h, (int64_t)1 << 44) * layers);  // which does not overflow
     }
     if (!t.mask.empty()) spend_array(budget, over(w, t.cell), over(h, t.cell), 1);
     if (!t.sources.empty())

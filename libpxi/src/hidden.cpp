@@ -51,7 +51,10 @@ template <class Each> static void around(int64_t i, int reach, int w, int h, Eac
 
 void unmix(const Edge &edge, const Components &mixed, Components &values, int w, int h) {
     std::vector<double> sums(values.size());
-    for (const auto &[i, share] : edge.share) {
+    const double *next = edge.share.data();
+    for (int64_t i = 0; i < (int64_t)edge.core.size(); i++) {
+        if (!edge.core[i]) continue;
+        const double share = *next++;
         int count = 0;
         std::fill(sums.begin(), sums.end(), 0);
         around(i, TELLING, w, h, [&](int64_t j) {
@@ -67,7 +70,7 @@ void unmix(const Edge &edge, const Components &mixed, Components &values, int w,
         int count = 0;
         std::fill(sums.begin(), sums.end(), 0);
         around(i, 1, w, h, [&](int64_t j) {
-            if (!edge.share.count(j)) return;
+            if (!edge.core[j]) return;
             count++;
             for (size_t c = 0; c < values.size(); c++) sums[c] += values[c][j];
         });

@@ -1,5 +1,6 @@
 #include "limits.h"
 
+#include <algorithm>
 #include <cstring>
 
 #include "errors.h"
@@ -45,10 +46,9 @@ void Budget::check(Limit limit, int64_t value) const {
 }
 
 void Budget::spend(Limit limit, int64_t amount) {
-    // Amounts are at most 2**62, and what exceeds a limit is never spent: no sum overflows.
-    check(limit, amount);
-    spent[limit] += amount;
-    check(limit, spent[limit]);
+    const int64_t room = INT64_MAX - spent[limit];
+    check(limit, spent[limit] + std::min(amount, room));
+    spent[limit] += std::min(amount, room);
     if (spent[FILE_BYTES] == 0 || spent[FILE_BYTES] > SMALL_FILE) return;
     if (limit == GATES) check(SMALL_GATES, spent[limit]);
     if (limit == CODES) check(SMALL_CODES, spent[limit]);

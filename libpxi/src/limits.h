@@ -33,7 +33,7 @@ class Budget {
     Limits limits;
     explicit Budget(const Limits &limits = {}) : limits(limits) {}
     void check(Limit limit, int64_t value) const;  // of `value` alone
-    void spend(Limit limit, int64_t amount);       // amount >= 0, at most 2**62
+    void spend(Limit limit, int64_t amount);       // amount >= 0
     int64_t left(Limit limit) const { return limits.at[limit] - spent[limit]; }
 };
 

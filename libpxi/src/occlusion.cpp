@@ -141,7 +141,7 @@ Mask Occlusion::bare_behind() const {
 Edge Occlusion::edge_of(const std::vector<int32_t> &own, const Mask &open, const Mask &lost) const {
     const Mask away = far(where(own.size(), [&](size_t i) { return own[i] < FULL && lost[i]; }), w, h, 1);
     Edge edge;
-    edge.outer.resize(own.size());
+    edge.core.resize(own.size()), edge.outer.resize(own.size());
     const auto at = [&](int x, int y) -> int64_t {
         return own[(int64_t)std::clamp(y, 0, h - 1) * w + std::clamp(x, 0, w - 1)];
     };
@@ -153,7 +153,8 @@ Edge Occlusion::edge_of(const std::vector<int32_t> &own, const Mask &open, const
         }
         const int x = (int)(i % w), y = (int)(i / w);
         const auto row = [&](int y) { return at(x - 1, y) + 4 * at(x, y) + at(x + 1, y); };
-        edge.share[i] = std::max((double)(row(y - 1) + 4 * row(y) + row(y + 1)) / (36. * FULL), 0.5);
+        edge.core[i] = 1;
+        edge.share.push_back(std::max((double)(row(y - 1) + 4 * row(y) + row(y + 1)) / (36. * FULL), 0.5));
     }
     return edge;
 }

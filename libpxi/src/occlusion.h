@@ -1,8 +1,6 @@
 // Which samples of a view show, and which are trusted (PYR-39 to PYR-41, PYR-46, PYR-52, PYR-53).
 #pragma once
 
-#include <map>
-
 #include "texture.h"
 
 namespace pxi {
@@ -11,9 +9,10 @@ typedef std::vector<uint8_t> Mask;  // [height][width] of a part, 0 or 1
 
 // Samples at the layer's own boundary that are unmixed (PYR-52).
 struct Edge {
-    std::map<int64_t, double> share;  // of the layer's own colour in a sample, 0.5..1
-    Mask outer;                       // samples beyond, which continue the colours of those
-    Mask free;                        // samples whose colour is that of what is behind
+    Mask core;                  // samples that are unmixed
+    std::vector<double> share;  // of the layer's own colour in each of these, in their order, 0.5..1
+    Mask outer;                 // samples beyond, which continue the colours of those
+    Mask free;                  // samples whose colour is that of what is behind
 };
 
 struct Masks {
