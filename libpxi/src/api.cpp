@@ -1,5 +1,6 @@
 // The C interface: what comes from a caller is checked here, and nothing is thrown over the border.
 #include <algorithm>
+#include <cstdio>
 #include <cstring>
 #include <new>
 #include <stdexcept>
@@ -38,15 +39,19 @@ template <class T> void fill(T *to, T value) {
     std::memcpy((void *)to, &value, sizeof(T));
 }
 
-pxi_status told(pxi_error *to, uint32_t status, const char *rule, const std::string &message, Place at) {
-    if (!to || to->size < sizeof(pxi_error)) return (pxi_status)status;
+// Makes no room for anything: memory may have ended.
+pxi_status told(pxi_error *to, uint32_t status, const char *rule, const char *message, Place at) {
+    if (!to) return (pxi_status)status;
     pxi_error error = PXI_ERROR_INIT;
     error.size = to->size, error.status = status, error.offset = at.offset;
-    std::strncpy(error.rule, rule, sizeof error.rule - 1);
-    std::string text = *at.chunk ? std::string("chunk ") + at.chunk + ": " + message : message;
-    size_t length = std::min(text.size(), sizeof error.message - 1);
-    while (length < text.size() && length && (text[length] & 0xC0) == 0x80) length--;  // no part of a character
-    std::memcpy(error.message, text.data(), length);
+    std::snprintf(error.rule, sizeof error.rule, "%s", rule);
+    const char *chunk = *at.chunk ? "chunk " : "", *then = *at.chunk ? ": " : "";
+    const int length = std::snprintf(error.message, sizeof error.message, "%s%s%s%s", chunk, at.chunk, then, message);
+    if (length >= (int)sizeof error.message) {  // no part of a character is left at the end
+        char *end = error.message + sizeof error.message - 2;
+        while (end > error.message && (*end & 0xC0) == 0x80) *end-- = 0;
+        if (*end & 0x80) *end = 0;
+    }
     std::memcpy(to, &error, sizeof error);
     return (pxi_status)status;
 }
@@ -57,21 +62,17 @@ template <class Work> pxi_status guarded(pxi_error *error, const Work &work) {
 #ifdef __cpp_exceptions
     try {
         work();
-        return told(error, PXI_OK, "", {}, {});
     } catch (const Failure &failure) {
-        return told(error, (uint32_t)failure.kind, failure.rule, failure.message, failure.at);
+        return told(error, (uint32_t)failure.kind, failure.rule, failure.message.c_str(), failure.at);
     } catch (const std::bad_alloc &) {
-    } catch (const std::length_error &) {
+        return told(error, PXI_MEMORY, "", "there is not enough memory", {});
+    } catch (const std::length_error &) {  // of a vector that is larger than any memory
+        return told(error, PXI_MEMORY, "", "there is not enough memory", {});
     }
-    if (error) {  // without making room for the text
-        error->status = PXI_MEMORY, error->offset = -1, error->rule[0] = 0;
-        std::strcpy(error->message, "there is not enough memory");
-    }
-    return PXI_MEMORY;
 #else
     work();
-    return told(error, PXI_OK, "", {}, {});
 #endif
+    return told(error, PXI_OK, "", "", {});
 }
 
 const Image &opened(const pxi_file *file) {

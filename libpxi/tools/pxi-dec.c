@@ -1,8 +1,10 @@
 /* Decodes a .pxi file to PNG: `pxi-dec IN.pxi OUT.png [flags]`. Flags and exit codes are those of pxi-decode. */
+#define _POSIX_C_SOURCE 200809L
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "png.h"
 #include "pxi.h"
@@ -155,6 +157,7 @@ static int decode(pxi_file *file, Command *c, pxi_error *error) {
     void *pixels = NULL;
     int status = numbers ? find_layers(file, c, numbers, error) : PXI_MEMORY;
     c->request.format = c->bits == 16 ? PXI_RGBA16 : PXI_RGBA8;
+    if (!c->request.threads) c->request.threads = (uint32_t)sysconf(_SC_NPROCESSORS_ONLN);
     if (c->layer_count) c->request.layers = numbers, c->request.layer_count = c->layer_count;
     if (!status) status = (int)pxi_measure(file, &c->request, &output, error);
     if (!status && !(pixels = malloc(output.bytes))) status = PXI_MEMORY;

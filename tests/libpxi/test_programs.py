@@ -87,40 +87,52 @@ def pixels_of(ppm):
     return np.frombuffer(ppm[size.end() :], np.uint8).reshape(height, width, 3)
 
 
-def check_example(program, library):
-    env = {**os.environ, "LD_LIBRARY_PATH": str(library)}
-    data = PHOTO.read_bytes()
-    done = subprocess.run([program], input=data, capture_output=True, env=env, check=True)
+@pytest.fixture(scope="module")
+def guide(build, tmp_path_factory):
+    """Runs a block of commands of the guide, by its number, in a folder with a picture."""
+    home = tmp_path_factory.mktemp("guide")
+    (home / "libpxi").symlink_to(ROOT / "libpxi")
+    shutil.copy(PHOTO, home / "photo.pxi")
+    here = {"-S libpxi": f"-S {ROOT / 'libpxi'}", "libpxi/build": str(build)}
+
+    def run_block(number):
+        commands = blocks("bash")[number]
+        for there, place in here.items():
+            commands = commands.replace(there, place)
+        run("bash", "-euc", commands, cwd=home, env={**os.environ, "HOME": str(home)})
+        return home
+
+    run_block(0)
+    return run_block
+
+
+def check_thumbnail(home, program):
     expected = pxi.open(PHOTO).render(width=64)
-    assert np.abs(pixels_of(done.stdout).astype(int) - expected[..., :3]).max() <= 1
-    broken = subprocess.run([program], input=b"no picture", capture_output=True, env=env)
+    found = pixels_of((home / "thumbnail.ppm").read_bytes())
+    assert np.abs(found.astype(int) - expected[..., :3]).max() <= 1
+    env = {**os.environ, "LD_LIBRARY_PATH": str(home / "pxi/lib")}
+    broken = subprocess.run([home / program], input=b"no picture", capture_output=True, env=env)
     assert broken.returncode == 1
     assert b"this is no .pxi file" in broken.stderr
+    return env
 
 
-def test_the_library_installs_and_a_c_program_finds_it(build, tmp_path):
+def test_a_c_program_finds_the_installed_library(guide):
     if shutil.which("pkg-config") is None:
         pytest.skip("pkg-config is not installed")
-    run("cmake", "--install", build, "--prefix", tmp_path / "pxi")
-    library = next(tmp_path.glob("pxi/lib*/**/libpxi.so")).parent
-    assert (tmp_path / "pxi/bin/pxi-dec").is_file()
-    env = {**os.environ, "PKG_CONFIG_PATH": str(library / "pkgconfig")}
-    flags = run("pkg-config", "--cflags", "--libs", "libpxi", env=env).split()
-    source, strict = EXAMPLES / "thumbnail.c", ["-std=c11", "-Wall", "-Wextra", "-Werror"]
-    run("cc", *strict, source, *flags, "-o", tmp_path / "c")
-    check_example(tmp_path / "c", library)
+    home = guide(1)
+    env = check_thumbnail(home, "thumbnail")
+    assert raster.read(home / "photo.png").pixels.shape[1] == 200
     if shutil.which("valgrind"):
-        words = ["valgrind", "-q", "--error-exitcode=9", "--leak-check=full", tmp_path / "c"]
-        env = {**env, "LD_LIBRARY_PATH": str(library)}
+        words = ["valgrind", "-q", "--error-exitcode=9", "--leak-check=full", home / "thumbnail"]
         done = subprocess.run(words, input=PHOTO.read_bytes(), capture_output=True, env=env)
         assert done.returncode == 0, done.stderr.decode()
 
 
-def test_a_rust_program_calls_the_library(build, tmp_path):
+def test_a_rust_program_calls_the_library(guide):
     if shutil.which("rustc") is None:
         pytest.skip("rustc is not installed")
-    run("rustc", "-L", build, EXAMPLES / "thumbnail.rs", "-o", tmp_path / "rust")
-    check_example(tmp_path / "rust", build)
+    check_thumbnail(guide(2), "thumbnail-rust")
 
 
 def test_a_desktop_shows_a_thumbnail(build, tmp_path):
