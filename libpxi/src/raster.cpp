@@ -30,22 +30,25 @@ Raster::Inputs Raster::inputs(int level, Window window) {
 }
 
 // Makes planes above a level, [rows][columns][3] of a window that holds the one that is asked for.
-std::vector<float> Raster::finer(int level, const Inputs &from, Window window, Window *under) const {
+Raster::Planes Raster::finer(int level, const Inputs &from, Window window, Window *under) const {
     const Shape coarser = grid.at(level + 1);
     const Window above = window.halved().grown(AROUND, coarser);
     *under = above.doubled(grid.at(level));
     const std::vector<int32_t> high = cut(from.high, 9, coarser, above);
-    const std::vector<float> planes = cut(from.low, 1, coarser, above, 3);
+    std::vector<float> part;  // unless the rows are whole
+    if (above.columns() < coarser.columns) part = cut(from.low, 1, coarser, above, 3);
+    const float *planes = part.empty() ? from.low + 3 * (int64_t)above.top * coarser.columns : part.data();
     const Synthetic &w = weights.synthesis_of(level + 1);
     const float t = (float)(plan.step - STEP_ORIGIN) / 128;
-    std::vector<float> gain(9), bias = w.first_bias, out(3 * under->shape().size());
+    std::vector<float> gain(9), bias = w.first_bias;
+    Planes out = std::make_unique_for_overwrite<float[]>(3 * under->shape().size());
     for (int k = 0; k < 9; k++) gain[k] = (float)std::exp((double)(w.gain[k] + w.gain_by_step[k] * t));
     for (size_t i = 0; i < bias.size(); i++) bias[i] += w.first_by_step[i] * t;
     const Listening listening(watch);
     const loops::Synthesis task = {w.linear.data(), w.first.data(), bias.data(), w.second.data(),
                                    w.second_bias.data(), w.third.data(), w.third_bias.data(), gain.data(),
                                    weights.hidden, above.rows(), above.columns(), under->rows(), under->columns(),
-                                   planes.data(), high.data(), out.data(), listening.function()};
+                                   planes, high.data(), out.get(), listening.function()};
     check_core(core().pyramid_synthesis(&task), plan.at);
     return out;
 }
@@ -67,8 +70,8 @@ const float *Raster::low(int level, Window window) {
         const Inputs from = inputs(level, part);
         strips(part, [&](Window strip) {
             Window under;
-            const std::vector<float> found = finer(level, from, strip, &under);
-            paste(found.data(), under.shape(), strip.inside(under), own.planes.data(), shape, strip, 1, 3);
+            const Planes found = finer(level, from, strip, &under);
+            paste(found.get(), under.shape(), strip.inside(under), own.planes.data(), shape, strip, 1, 3);
         });
         own.made.add(part);
     }
@@ -128,11 +131,11 @@ const float *Raster::samples(int level, Window window) {
     for (const Window &part : own.made.lacking(window)) {
         const Inputs from = level ? Inputs{nullptr, low(level, part)} : inputs(0, part);
         strips(part, [&](Window strip) {
-            std::vector<float> found;
+            Planes found;
             Window under = Window::whole(wanted), at = strip;
             if (level == 0) found = finer(0, from, strip, &under), at = strip.inside(under);
             const int64_t stride = 3 * (int64_t)under.columns();
-            const float *planes = (level ? from.low : found.data()) + at.top * stride + 3 * at.left;
+            const float *planes = (level ? from.low : found.get()) + at.top * stride + 3 * at.left;
             colour(weights, planes, stride, own.planes.data(), wanted, strip);
         });
         own.made.add(part);

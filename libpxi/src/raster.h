@@ -24,7 +24,8 @@ class Raster {
         const float *low;
     };
     Inputs inputs(int level, Window window);
-    std::vector<float> finer(int level, const Inputs &from, Window window, Window *under) const;
+    typedef std::unique_ptr<float[]> Planes;  // [h][w][3]
+    Planes finer(int level, const Inputs &from, Window window, Window *under) const;
     const float *low(int level, Window window);
     template <class Make> void strips(Window part, Make make) const;
     std::vector<float> matrix(int level) const;
