@@ -6,6 +6,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -93,13 +94,15 @@ def guide(build, tmp_path_factory):
     home = tmp_path_factory.mktemp("guide")
     (home / "libpxi").symlink_to(ROOT / "libpxi")
     shutil.copy(PHOTO, home / "photo.pxi")
+    rustup = os.environ.get("RUSTUP_HOME", str(Path.home() / ".rustup"))
+    env = {**os.environ, "HOME": str(home), "RUSTUP_HOME": rustup}
     here = {"-S libpxi": f"-S {ROOT / 'libpxi'}", "libpxi/build": str(build)}
 
     def run_block(number):
         commands = blocks("bash")[number]
         for there, place in here.items():
             commands = commands.replace(there, place)
-        run("bash", "-euc", commands, cwd=home, env={**os.environ, "HOME": str(home)})
+        run("bash", "-euc", commands, cwd=home, env=env)
         return home
 
     run_block(0)
