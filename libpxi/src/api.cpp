@@ -191,6 +191,7 @@ pxi_status pxi_measure(const pxi_file *file, const pxi_request *request, pxi_out
         pxi_output found{};
         found.width = own.view.width, found.height = own.view.height, found.opaque = own.opaque(image);
         found.row_bytes = own.view.width * pixel_bytes(asked.format);
+        if ((uint64_t)found.row_bytes * own.view.height > PTRDIFF_MAX) fail(Kind::LIMIT, "", "no buffer can hold the picture");
         found.bytes = found.row_bytes * own.view.height;
         fill(output, found);
     });

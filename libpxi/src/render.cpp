@@ -147,7 +147,8 @@ void render(Image &image, const Request &request, const Put &put, const Told &to
     const View &view = request.view;
     Budget budget(request.limits);
     budget.spend(OUTPUT_PIXELS, (int64_t)view.width * view.height);
-    budget.spend(MULTIPLY_ADDS, (int64_t)request.drawn.size() * view.columns() * view.rows() * SAMPLE_COST);
+    const __int128 cost = (__int128)request.drawn.size() * view.columns() * view.rows() * SAMPLE_COST;
+    budget.spend(MULTIPLY_ADDS, (int64_t)std::min<__int128>(cost, INT64_MAX));
     Progress progress(told);
     const Heard heard(*image.textures, progress, request.threads);
     Canvas canvas{image, request, {}, {}, {}, {}};
