@@ -20,6 +20,19 @@
 
 using namespace PXI_LEVEL;
 
+// What some work says that went wrong. Without exceptions (WebAssembly) the program ends where memory does.
+template <class Work> static int guarded(Work work) {
+#if __cpp_exceptions
+    try {
+        return work();
+    } catch (const std::bad_alloc &) {
+        return NO_MEMORY;
+    }
+#else
+    return work();
+#endif
+}
+
 #pragma GCC visibility push(default)
 extern "C" {
 
@@ -34,39 +47,25 @@ int64_t PXI(rans_encode)(const uint16_t *start, const uint16_t *freq, const int6
 
 // Decodes the lowest planes of a pyramid; what went wrong, if anything.
 int PXI(pyramid_lowest)(Lowest *planes) {
-    try {
-        return decode_lowest(*planes);
-    } catch (const std::bad_alloc &) {
-        return NO_MEMORY;
-    }
+    return guarded([&] { return decode_lowest(*planes); });
 }
 
 // Codes a level of a pyramid; what went wrong, if anything.
 int PXI(pyramid_level)(Level *level) {
-    try {
-        return LevelCoder(*level).run();
-    } catch (const std::bad_alloc &) {
-        return NO_MEMORY;
-    }
+    return guarded([&] { return LevelCoder(*level).run(); });
 }
 
 // Planes that bands give by the plain wavelet; what went wrong, if anything.
 int PXI(next_plain)(const Plain *planes) {
-    try {
+    return guarded([&] {
         Lifting(*planes).run();
         return NOTHING;
-    } catch (const std::bad_alloc &) {
-        return NO_MEMORY;
-    }
+    });
 }
 
 // Synthesis of a level of a pyramid; what went wrong, if anything.
 int PXI(pyramid_synthesis)(const Synthesis *level) {
-    try {
-        return Synthesizer(*level).run();
-    } catch (const std::bad_alloc &) {
-        return NO_MEMORY;
-    }
+    return guarded([&] { return Synthesizer(*level).run(); });
 }
 
 // Network output of `n` entries: out is [n][channels].
@@ -106,22 +105,18 @@ int PXI(coverage)(Cover *to, const int64_t *segments, const int64_t *log2, int64
 
 // Fills the unknown values of a plane; see `Diffusion`.
 int PXI(diffused)(const Plane *plane, const uint8_t *done) {
-    try {
+    return guarded([&] {
         Diffusion().run(*plane, done);
         return NOTHING;
-    } catch (const std::bad_alloc &) {
-        return NO_MEMORY;
-    }
+    });
 }
 
 // Completes a plane by references; see `complete`.
 int PXI(completed)(Copies *copies) {
-    try {
+    return guarded([&] {
         complete(*copies);
         return NOTHING;
-    } catch (const std::bad_alloc &) {
-        return NO_MEMORY;
-    }
+    });
 }
 
 // Puts colours behind what is there; see `blend`.
