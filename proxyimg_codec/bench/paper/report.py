@@ -15,7 +15,6 @@ from pathlib import Path
 from ..._version import __version__
 from ...io.files import write_atomically
 from ..rd import machine
-from . import MISSING
 from .charts import plot
 from .items import Row
 from .tables import Table
@@ -84,10 +83,6 @@ def to_csv(rows: Sequence[Row]) -> str:
     return out.getvalue()
 
 
-def _without() -> str:
-    return f"Parts of the paper that this command does not make yet: {', '.join(MISSING)}."
-
-
 def markdown(parts: Sequence[Part], head: Sequence[str]) -> str:
     """The report as Markdown."""
     lines = ["# The paper's tables, made again", "", "```", *head, "```", ""]
@@ -103,7 +98,7 @@ def markdown(parts: Sequence[Part], head: Sequence[str]) -> str:
         lines += ["| " + " | ".join(line) + " |" for line in table[1:]]
         lines += ["", f"![{part.title}]({part.name}.svg)", ""]
         lines += [f"- {note}" for note in part.remarks] + [""]
-    return "\n".join([*lines, _without(), ""])
+    return "\n".join(lines)
 
 
 def page(parts: Sequence[Part], head: Sequence[str]) -> str:
@@ -127,7 +122,7 @@ def page(parts: Sequence[Part], head: Sequence[str]) -> str:
         out.append(f"</table><p>{image}</p><ul>")
         out += [f"<li>{_marked(note)}</li>" for note in part.remarks]
         out.append("</ul>")
-    return "\n".join([*out, f"<p>{html.escape(_without())}</p></html>", ""])
+    return "\n".join([*out, "</html>", ""])
 
 
 def _capital(text: str) -> str:
