@@ -1,12 +1,10 @@
 """pxi-bench paper: sections, resuming, and the report."""
 
-import json
 from functools import partial
 
 import numpy as np
 import pytest
 
-from proxyimg_codec.bench import workers
 from proxyimg_codec.bench.paper import (
     SECTIONS,
     explicit,
@@ -24,31 +22,8 @@ from proxyimg_codec.bench.peers import codecs
 from proxyimg_codec.bench.rivals import sines
 from proxyimg_codec.errors import InputError
 from proxyimg_codec.io import raster
+from tests.support.paper import rows_of
 from tests.support.pictures import disc, smooth
-
-TINY = items.Effort(1, 37, 48, 30, 5, 2, 4, 1, 20, 40, 2)
-
-
-@pytest.fixture
-def data(tmp_path):
-    folder = tmp_path / "data"
-    (folder / "kodak").mkdir(parents=True)
-    for name, (width, height) in (("a", (37, 41)), ("b c", (50, 45))):
-        raster.write(folder / "kodak" / f"{name}.png", smooth(width, height))
-    return folder
-
-
-@pytest.fixture
-def here(monkeypatch):
-    """Measures in this process, with little effort."""
-    monkeypatch.setattr(workers, "run", lambda work, tasks, jobs, finished: [
-        finished(work(task)) for task in tasks])  # fmt: skip
-    monkeypatch.setattr(items, "QUICK", TINY)
-
-
-def rows_of(out, section):
-    found = sorted((out / "items" / section).iterdir())
-    return [row for path in found for row in json.loads(path.read_bytes())["rows"]]
 
 
 def test_a_run_from_pictures_to_a_report(tool, data, tmp_path, here):
