@@ -50,6 +50,8 @@ def add(tools: Any) -> None:
                    "fits: minutes instead of a night")  # fmt: skip
     p.add_argument("--resume", action="store_true", help="go on from the measurements in DIR that "
                    "still hold: same pictures, settings, code and versions")  # fmt: skip
+    p.add_argument("--report", action="store_true", help="measure nothing more; report what is "
+                   "in DIR and still holds, while a run goes on or after an interruption")  # fmt: skip
     p.add_argument("-j", "--jobs", type=int, metavar="N", help="cores to use, by as many "
                    "processes; all by default")  # fmt: skip
     p.add_argument("-f", "--force", action="store_true", help="replace the results in DIR")
@@ -80,9 +82,9 @@ def work(args: argparse.Namespace, command: str) -> None:
     given = Given(data, tuple(Path(p) for p in args.photos), weights_of(args.weights))
     plan = run.plan(given, names, QUICK if args.quick else FULL)
     out.mkdir(exist_ok=True)
-    if not args.resume:
+    if not (args.resume or args.report):
         run.forget(out, plan)
-    groups = plan.groups(out)
+    groups = [] if args.report else plan.groups(out)
 
     def say(text: str) -> None:
         if not args.quiet:
@@ -140,6 +142,8 @@ def check_out(out: Path, args: argparse.Namespace) -> None:
         UsageError: The folder is that of the pictures, or flags contradict each other.
         InputError: The folder holds other results, or cannot be made.
     """
+    if args.report:
+        args.resume = True
     if args.resume and args.force:
         raise UsageError("--resume keeps the results that --force would replace")
     if out.exists() and Path(args.data).exists() and out.samefile(args.data):

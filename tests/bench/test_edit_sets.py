@@ -155,7 +155,7 @@ def test_scripts_that_fail_are_named(tmp_path):
     script = {"version": 1, "edits": [{"op": "remove", "layer": "nobody"}]}
     (tmp_path / "h/scripts/one.json").write_text(json.dumps(script))
     (case,) = edit_sets.humanedit(tmp_path / "h")
-    with pytest.raises(Exception, match=r"script of one: .*nobody"):
+    with pytest.raises(InputError, match=r"script of one: .*nobody"):
         editing._measure(case.before, {}, case=case, weights={}, effort=1)
 
 

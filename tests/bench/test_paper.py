@@ -168,7 +168,9 @@ def test_a_failure_leaves_the_rest(data, tmp_path, here):
     run.measure(plan.groups(tmp_path), 1, failed.append)
     assert [f.message for f in failed] == ["implicit, a, two: bad luck"]
     run.write(tmp_path, plan, ["head"])
-    assert "| one |" in (tmp_path / "report.md").read_text()
+    text = (tmp_path / "report.md").read_text()
+    assert "| one |" in text
+    assert "- Only 1 of 3 measurements are there yet." in text
 
 
 def test_results_are_kept(tool, data, tmp_path, here, monkeypatch):
@@ -184,6 +186,14 @@ def test_results_are_kept(tool, data, tmp_path, here, monkeypatch):
     assert "--resume" in tool(*words, code=3).err
     tool(*words, "--resume")
     assert (tmp_path / "out/implicit.csv").read_text() == first
+    (tmp_path / "out/report.md").unlink()
+    tool(*words, "--report")
+    assert "| pxi direct |" in (tmp_path / "out/report.md").read_text()
+    (held,) = (tmp_path / "out/items/implicit").iterdir()
+    held.unlink()
+    tool(*words, "--report")
+    assert "or is to come" in (tmp_path / "out/report.md").read_text()
+    assert not held.exists()
     tool(*words, "--force", "--quiet")
     tool(*words, "--force", "--resume", code=2)
 

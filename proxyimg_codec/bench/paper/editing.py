@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from ...errors import PxiError
+from ...errors import InputError, PxiError
 from .edit_sets import Case, humanedit, oir_bench, operations
 from .items import Earlier, Effort, Given, Item, Pixels, Row
 from .tables import Column, Table, mean
@@ -106,7 +106,7 @@ def _measure(
         try:
             edited = image.edited(*operations(case, Path(folder)))
         except PxiError as error:
-            raise type(error)(f"script of {case.name}: {error}") from None
+            raise InputError(f"script of {case.name}: {error}") from None
     seconds = time.process_time() - started
     shown = {"pxi": edited.render(), "encoded": image.render(), "unchanged": pixels}
     return [

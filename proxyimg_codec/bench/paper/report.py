@@ -35,6 +35,7 @@ class Part:
         table: Form of its table.
         rows: What was measured.
         absent: Why nothing was measured, instead.
+        measured: Number of measurements that are there, and of all.
     """
 
     name: str
@@ -42,11 +43,14 @@ class Part:
     table: Table
     rows: Sequence[Row]
     absent: str = ""
+    measured: tuple[int, int] = (0, 0)
 
     @property
     def remarks(self) -> list[str]:
-        """Conclusions, then notes."""
-        return [*self.table.conclusions(self.rows), *self.table.notes]
+        """What is still to come, conclusions, then notes."""
+        there, planned = self.measured
+        left = [f"Only {there} of {planned} measurements are there yet."] if there < planned else []
+        return [*left, *self.table.conclusions(self.rows), *self.table.notes]
 
 
 def header(command: str) -> list[str]:

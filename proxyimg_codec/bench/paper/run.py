@@ -87,9 +87,11 @@ def write(out: Path, made: Plan, head: Sequence[str]) -> None:
     for name, title in SECTIONS.items():
         if name in made.items or name in made.absent:
             items = made.items.get(name, [])
-            rows = [row for item in items for row in store.load(out, item) or []]
-            why = made.absent.get(name, "" if rows else "every measurement failed")
-            parts.append(report.Part(name, title, _module(name).TABLE, rows, why))
+            loaded = [rows for item in items if (rows := store.load(out, item)) is not None]
+            rows = [row for measured in loaded for row in measured]
+            why = made.absent.get(name, "" if rows else "every measurement failed, or is to come")
+            count = (len(loaded), len(items))
+            parts.append(report.Part(name, title, _module(name).TABLE, rows, why, count))
     report.write(out, parts, head)
 
 
