@@ -51,7 +51,7 @@ def add(tools: Any) -> None:
     p.add_argument("--resume", action="store_true", help="go on from the measurements in DIR that "
                    "still hold: same pictures, settings, code and versions")  # fmt: skip
     p.add_argument("--report", action="store_true", help="measure nothing more; report what is "
-                   "in DIR and still holds, while a run goes on or after an interruption")  # fmt: skip
+                   "in DIR and still holds")  # fmt: skip
     p.add_argument("-j", "--jobs", type=int, metavar="N", help="cores to use, by as many "
                    "processes; all by default")  # fmt: skip
     p.add_argument("-f", "--force", action="store_true", help="replace the results in DIR")
