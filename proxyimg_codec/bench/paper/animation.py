@@ -56,7 +56,7 @@ TABLE = Table(
         Column("idle", "without flow", "{:.2f}"),
         Column("step", "px a frame", "{:.2f}"),
         Column("gradients", "HOG distance", "{:.3f}"),
-        Column("frechet", "Fréchet, HOG", "{:.4f}"),
+        Column("frechet", "Fréchet, HOG ×10⁻³", "{:.3f}"),
         Column("away", "px from rest", "{:.1f}"),
         Column("seconds", "CPU s", "{:.1f}"),
     ),
@@ -72,8 +72,8 @@ TABLE = Table(
         "histograms of oriented gradients of all blocks at three scales, of frames against the "
         "still. It cannot be compared with FID, whose network is not to be had here. For scale, "
         "*moved aside* is the still, moved 8 px, and *other pictures* are those of the section.",
-        "VideoScore is a model of 8 billion parameters; its columns are missing. The paper's "
-        "figures are of videos of its own, so none stand here.",
+        "VideoScore needs a large model that no package brings; its columns are missing. The "
+        "paper's figures are of videos of its own, so none stand here.",
     ),
 )
 
@@ -126,7 +126,7 @@ def _likeness(still: Pixels, shown: Sequence[Pixels]) -> Row:
     from ..features import distance, frechet
 
     away = float(np.mean([distance(still, frame).mean() for frame in shown]))
-    return {"gradients": round(away, 5), "frechet": round(frechet([still], shown), 6)}
+    return {"gradients": round(away, 5), "frechet": round(1000 * frechet([still], shown), 5)}
 
 
 def _measure(
