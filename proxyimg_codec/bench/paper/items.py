@@ -79,7 +79,7 @@ class Effort:
 FULL = Effort()
 QUICK = Effort(
     pictures=2, side=256, width=64, direct=8000, node=600, most=2000, effort=4, paths=600,
-    photo=512, checked=1000,
+    photo=512, checked=2000,
 )  # fmt: skip
 
 
