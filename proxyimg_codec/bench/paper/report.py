@@ -47,7 +47,7 @@ class Part:
 
     @property
     def remarks(self) -> list[str]:
-        """What is still to come, conclusions, then notes."""
+        """Notes: on what is to come, conclusions, and those of the table."""
         there, planned = self.measured
         left = [f"Only {there} of {planned} measurements are there yet."] if there < planned else []
         return [*left, *self.table.conclusions(self.rows), *self.table.notes]
