@@ -189,3 +189,31 @@ def test_weights_that_are_wrong_are_refused(tool, data, tmp_path):
     words = ("bench", "paper", "--data", data, "--out", tmp_path / "out", "--weights")
     assert "clip, dino, lpips" in tool(*words, "vgg=x", code=2).err
     assert "does not exist" in tool(*words, "dino=nowhere", code=3).err
+
+
+def test_clip_and_dino_are_folders_of_transformers(tmp_path):
+    """Small models of random weights: what is alike is 1, what differs less, and words count."""
+    t = pytest.importorskip("transformers")
+    small = {"hidden_size": 16, "intermediate_size": 16, "num_hidden_layers": 1,
+             "num_attention_heads": 2}  # fmt: skip
+    seen = {**small, "image_size": 32, "patch_size": 16}
+    letters = [c + end for end in ("", "</w>") for c in "acdefghot "]
+    vocabulary = {w: k for k, w in enumerate([*letters, "<|startoftext|>", "<|endoftext|>"])}
+    words = {**small, "vocab_size": len(vocabulary), "bos_token_id": 20, "eos_token_id": 21}
+    clip, dino = tmp_path / "clip", tmp_path / "dino"
+    config = t.CLIPConfig(text_config=words, vision_config=seen, projection_dim=8)
+    t.CLIPModel(config).save_pretrained(clip)
+    crop = {"height": 32, "width": 32}
+    t.CLIPImageProcessor(size={"shortest_edge": 32}, crop_size=crop).save_pretrained(clip)
+    (clip / "vocab.json").write_text(json.dumps(vocabulary))
+    (clip / "merges.txt").write_text("#version: 0.2\n")
+    (clip / "tokenizer_config.json").write_text('{"tokenizer_class": "CLIPTokenizer"}')
+    t.ViTModel(t.ViTConfig(**seen)).save_pretrained(dino)
+    t.ViTImageProcessor(size=crop).save_pretrained(dino)
+    one, weights = smooth(50, 40), {"clip": clip, "dino": dino}
+    same = judges.judged(weights, one, one, "a cat")
+    assert (same["clip_i"], same["dino"]) == (1, 1)
+    assert -1 <= same["clip_t"] < 1
+    other = judges.judged(weights, one, 255 - one, "a dog")
+    assert other["clip_i"] < 1 > other["dino"]
+    assert other["clip_t"] != same["clip_t"]
