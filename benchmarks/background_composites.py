@@ -17,10 +17,11 @@ from benchmarks import background_scores as scores
 from benchmarks.background_peers import PEERS
 from benchmarks.background_scores import Mask, Real
 from benchmarks.common import Pixels, kodak, read_rgb
-from benchmarks.composites import Sprite, reduced, scaled, solid
+from benchmarks.composites import reduced
 from benchmarks.layer_scores import interval
 from proxyimg_codec import encode
 from proxyimg_codec.api import Image
+from proxyimg_codec.bench.sprites import Sprite, scaled, solid
 from proxyimg_codec.encoder.shapes.masks import Region
 from proxyimg_codec.io import raster
 

@@ -15,9 +15,10 @@ import numpy as np
 from benchmarks.background_composites import OURS, inpainted, pasted, removed
 from benchmarks.background_scores import Mask
 from benchmarks.common import Pixels, kodak, read_rgb
-from benchmarks.composites import reduced, scaled, solid
+from benchmarks.composites import reduced
 from proxyimg_codec import encode
 from proxyimg_codec.api import Image
+from proxyimg_codec.bench.sprites import scaled, solid
 from proxyimg_codec.encoder.shapes.masks import Region
 from proxyimg_codec.io import raster
 

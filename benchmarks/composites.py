@@ -20,6 +20,7 @@ from PIL import Image
 
 from benchmarks.common import Pixels, read_rgb
 from benchmarks.layer_scores import Mask, Point
+from proxyimg_codec.bench.sprites import Sprite, scaled, solid
 
 Floats = NDArray[np.float32]
 
@@ -37,10 +38,6 @@ LEAST = 0.015
 OVERLAP = (0.1, 0.5)
 """Share of the rear sprite of an overlapping pair that the front one covers."""
 
-SOLID, FILLED, CLEAR = 0.9, (0.25, 0.97), 0.1
-"""Least share of a sprite in its largest part, its share of its box, and most share of it that is
-translucent: scattered strokes are no object, a full rectangle is a picture, a lens is not seen."""
-
 EDGES, RESAMPLED, REBLUR = 99, 0.5, 1.0
 """Percentile of gradients that are edges; standard deviations, in pixels, of the blur that reducing
 a sprite leaves, and of the one that edges are compared with."""
@@ -50,27 +47,6 @@ APART = np.ones((9, 9), np.uint8)
 
 TRIES = 200
 """Places that are tried for sprites, before others are chosen."""
-
-
-class Sprite(NamedTuple):
-    """A sprite in its place.
-
-    Attributes:
-        rgba: uint8 [h, w, 4].
-        x: First column.
-        y: First row.
-    """
-
-    rgba: Pixels
-    x: int
-    y: int
-
-    def on(self, shape: tuple[int, ...]) -> Pixels:
-        """The sprite on a clear canvas, uint8 [H, W, 4]."""
-        canvas = np.zeros((*shape[:2], 4), np.uint8)
-        height, width = self.rgba.shape[:2]
-        canvas[self.y : self.y + height, self.x : self.x + width] = self.rgba
-        return canvas
 
 
 class Composite(NamedTuple):
@@ -159,23 +135,6 @@ def _placed(
     return placed
 
 
-def solid(rgba: Pixels) -> Pixels | None:
-    """Crops a sprite uint8 [H, W, 4] to what is inside; None if it is no solid object."""
-    inside = rgba[..., 3] >= 128
-    if not inside.any():
-        return None
-    rows, columns = np.flatnonzero(inside.any(1)), np.flatnonzero(inside.any(0))
-    part = (slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1))
-    areas = cv2.connectedComponentsWithStats(inside.astype(np.uint8))[2][1:, cv2.CC_STAT_AREA]
-    filled = float(inside[part].mean())
-    translucent = inside & (rgba[..., 3] < 240)
-    if areas.max() < SOLID * areas.sum() or not FILLED[0] <= filled <= FILLED[1]:
-        return None
-    if translucent.sum() > CLEAR * inside.sum():
-        return None
-    return np.ascontiguousarray(rgba[part])
-
-
 def reduced(pixels: Pixels, side: int) -> Pixels:
     """Reduces a picture [H, W, C] to a longer side of at most `side` pixels."""
     scale = side / max(pixels.shape[:2])
@@ -231,14 +190,6 @@ def _softened(rgba: Pixels, blur: float) -> Floats:
     layer = np.asarray(cv2.GaussianBlur(layer, (0, 0), more), np.float32)
     layer[..., :3] /= np.maximum(layer[..., 3:] / 255, 1e-6)
     return layer
-
-
-def scaled(rgba: Pixels, side: float) -> Pixels:
-    """Scales a sprite to a longer side of `side` pixels, with premultiplied colours."""
-    scale = side / max(rgba.shape[:2])
-    size = (max(1, round(rgba.shape[1] * scale)), max(1, round(rgba.shape[0] * scale)))
-    picture = Image.fromarray(rgba).convert("RGBa").resize(size, Image.Resampling.LANCZOS)
-    return np.asarray(picture.convert("RGBA"))
 
 
 def sprite_files(data: Path) -> list[Path]:

@@ -7,140 +7,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
-import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.common import Pixels, centre_crop, kodak, read_rgb
 from proxyimg_codec.animate.animate import amplitude
 from proxyimg_codec.animate.motion import PRESETS
 from proxyimg_codec.api import Image
-from proxyimg_codec.geometry import coverage as cover
-from proxyimg_codec.geometry.mesh import FRACTION_BITS
-from proxyimg_codec.geometry.warp import Warp
-from proxyimg_codec.render.compose import outline
-from proxyimg_codec.render.view import View, make_view
+from proxyimg_codec.bench.consistency import ENLARGED, MARGIN, pair, rms
+from proxyimg_codec.bench.features import distance
 
-Real = NDArray[np.float64]
+__all__ = ["features", "flow", "rms"]
+
 Moving = Callable[[Image, str], Image]
-
-MARGIN = 2
-"""Distance from outlines, in pixels, within which pixels are left out."""
-
-ENLARGED = 4
-"""Samples per pixel, across and down, of the frames that are warped; so many that interpolation is
-almost exact."""
 
 PAIRS = 7
 """Pairs of consecutive frames, spread over the clip."""
-
-NOWHERE = -1
-"""Label of pixels near outlines."""
-
-SCALES = 3
-"""Scales at which features are compared, each half as large as the one before."""
-
-CROSS = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
-DISC = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * MARGIN + 1, 2 * MARGIN + 1))
-
-
-def rms(values: NDArray[Any]) -> float:
-    """Root mean square of values; 0 for an empty array."""
-    return float(np.sqrt((values.astype(np.float64) ** 2).mean())) if values.size else 0.0
-
-
-def labels(image: Image, view: View) -> NDArray[np.int64]:
-    """Layer that each pixel of a still shows, int64 [H, W]; `NOWHERE` near outlines."""
-    seen = np.zeros((view.height, view.width), np.int64)
-    near = np.zeros(seen.shape, np.uint8)
-    for number, layer in enumerate(image.layers):
-        paths = outline(layer.outline, view)
-        if paths is None:
-            continue
-        covered = cover.coverage(paths, 0, 0, view.width, view.height)
-        seen[covered > 0] = number
-        # The rim of the fully covered pixels counts too, as outlines may lie on edges of pixels.
-        full = (covered == cover.FULL).astype(np.uint8)
-        near |= np.asarray(cv2.morphologyEx(full, cv2.MORPH_GRADIENT, CROSS), np.uint8)
-        near |= ((covered > 0) & (covered < cover.FULL)).astype(np.uint8)
-    return np.where(cv2.dilate(near, DISC) > 0, NOWHERE, seen)
-
-
-def origins(before: Image, after: Image, seen: NDArray[np.int64], view: View) -> Real:
-    """Canvas points, in an earlier still, of the texture points that a later still shows.
-
-    Args:
-        before: The earlier still.
-        after: The later still of the same picture.
-        seen: int64 [H, W] layer that each pixel of `after` shows, or `NOWHERE`.
-        view: View of the whole canvas.
-
-    Returns:
-        float64 [H, W, 2] x, y; NaN for pixels that show no layer with a mesh.
-    """
-    out = np.full((*seen.shape, 2), np.nan)
-    box = (0, 0, view.width, view.height)
-    for number, (old, new) in enumerate(zip(before.layers, after.layers, strict=True)):
-        row, column = np.nonzero(seen == number)
-        if new.mesh is None or not len(row):
-            continue
-        refined = new.mesh.refined
-        warp = Warp(new.pose, new.mesh, meshed=True)
-        face = warp.faces(*view.grid, box)[row, column]
-        x, y = view.columns(0, view.width)[column], view.rows(0, view.height)[row]
-        found = warp.locate(x, y, face)
-        assert found.face is not None
-        assert found.weights is not None
-        corners = old.pose.present(refined)[refined.faces[found.face]] / (1 << FRACTION_BITS)
-        out[row, column] = (found.weights[..., None] * corners).sum(1)
-    return out
-
-
-def warped(picture: NDArray[np.float32], points: Real, scale: int) -> NDArray[np.float32]:
-    """Samples a picture at canvas points.
-
-    Args:
-        picture: float32 [h, w, 3] picture.
-        points: float64 [H, W, 2] x, y in canvas pixels; NaN counts as 0.
-        scale: Samples of the picture per canvas pixel.
-
-    Returns:
-        float32 [H, W, 3].
-    """
-    at = np.nan_to_num(points * scale - 0.5, nan=0.0).astype(np.float32)
-    x, y = np.ascontiguousarray(at[..., 0]), np.ascontiguousarray(at[..., 1])
-    border = cv2.BORDER_REPLICATE
-    return np.asarray(cv2.remap(picture, x, y, cv2.INTER_CUBIC, borderMode=border), np.float32)
-
-
-def pair(before: Image, after: Image) -> list[float]:
-    """Compares two stills at pixels that show the same point of the same moving layer.
-
-    Returns:
-        The number of these pixels; sums over them of squared differences in 8-bit levels (mean over
-        channels) along the flow from enlarged frames, along the flow from frames as they are, and
-        without flow; and the sum of displacements in pixels.
-    """
-    view = make_view((after.width, after.height))
-    then, now = labels(before, view), labels(after, view)
-    points = origins(before, after, now, view)
-    last = np.array([view.width, view.height]) - MARGIN
-    inside = np.asarray((points >= MARGIN).all(2) & (points < last).all(2))
-    x, y = np.where(inside[..., None], points, 0).astype(int).transpose(2, 0, 1)
-    good = inside & (now > 0) & (then[y, x] == now)
-    small, large, result = (
-        255 * still.render(dtype=np.float32, scale=scale)[..., :3]
-        for still, scale in ((before, 1), (before, ENLARGED), (after, 1))
-    )
-    tries = (warped(large, points, ENLARGED), warped(small, points, 1), small)
-    squares = [float(((t - result)[good].astype(float) ** 2).mean(1).sum()) for t in tries]
-    row, column = np.nonzero(good)
-    centres = np.stack(
-        [view.columns(0, view.width)[column], view.rows(0, view.height)[row]], axis=1
-    )
-    return [float(len(row)), *squares, float(np.hypot(*(points[good] - centres).T).sum())]
 
 
 def flow(images: dict[str, Image], moving: Moving) -> Iterator[str]:
@@ -170,28 +52,6 @@ def flow(images: dict[str, Image], moving: Moving) -> Iterator[str]:
                 f"  {texture:8s} {name:7s} {exact:5.2f} {plain:5.2f} {idle:6.2f}  {share:2.0f} %  "
                 f"{length / max(pixels, 1):.2f} px"
             )
-
-
-def hog(pixels: Pixels) -> list[NDArray[np.float32]]:
-    """Histograms of oriented gradients (Dalal, Triggs 2005): a unit vector at each scale.
-
-    Cells have 8 samples a side and 9 orientations, in blocks of 2 x 2 cells with the normalization
-    of OpenCV. They are found in grey at full, half and quarter size, whose sides must be multiples
-    of 8.
-    """
-    grey = cv2.cvtColor(pixels, cv2.COLOR_RGB2GRAY)
-    found = []
-    for k in range(SCALES):
-        size = (grey.shape[1] >> k, grey.shape[0] >> k)
-        small = cv2.resize(grey, size, interpolation=cv2.INTER_AREA)
-        vector = np.ravel(cv2.HOGDescriptor(size, (16, 16), (8, 8), (8, 8), 9).compute(small))
-        found.append(np.asarray(vector / max(float(np.linalg.norm(vector)), 1e-9), np.float32))
-    return found
-
-
-def distance(one: Pixels, other: Pixels) -> Real:
-    """Distances of the features of two pictures at each scale, float64 [SCALES] in 0..sqrt(2)."""
-    return np.array([np.linalg.norm(a - b) for a, b in zip(hog(one), hog(other), strict=True)])
 
 
 def features(images: dict[str, Image], moving: Moving, data: Path) -> Iterator[str]:

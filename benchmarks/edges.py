@@ -23,8 +23,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.common import Pixels, header, kodak, read_rgb
-from benchmarks.composites import Sprite, reduced, rgba, scaled, solid, sprite_files
+from benchmarks.composites import reduced, rgba, sprite_files
 from proxyimg_codec import encode
+from proxyimg_codec.bench.sprites import Sprite, scaled, solid
 from proxyimg_codec.encoder.shapes.masks import Region
 from proxyimg_codec.io import raster
 

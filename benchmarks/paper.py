@@ -20,6 +20,7 @@ from benchmarks.common import centre_crop, header, kodak, read_rgb
 from benchmarks.figures import FLOAT_GRID
 from proxyimg_codec import encode
 from proxyimg_codec.bench.paper import ours
+from proxyimg_codec.bench.paper.ablations import ABLATIONS, METHOD
 from proxyimg_codec.bench.paper.ours import Case
 from proxyimg_codec.bench.rivals.fitting import Fitted
 from proxyimg_codec.encoder.implicit.node_problem import NodeOptions
@@ -31,17 +32,6 @@ PAPER_PARAMETERS, PAPER_PSNR = 59955, 36.99
 
 PROBE = 300
 """Optimizer steps from which the speed of direct fitting is measured."""
-
-ABLATIONS = {
-    "edge only": NodeOptions(local="none"),
-    "edge + single": NodeOptions(local="single"),
-    "edge + multi (the method)": NodeOptions(),
-    "multi only": NodeOptions(edge=False),
-    "no feature encoding": NodeOptions(octaves=0),
-    "inverse distance inside": NodeOptions(distance=True),
-    "random code a node": NodeOptions(own_codes=True),
-}
-"""Variants of node sampling, by description; files cannot store the last two."""
 
 
 def direct(case: Case, seconds: float) -> Fitted:
@@ -102,7 +92,7 @@ def ablations(cases: list[Case], steps: int) -> None:
         for name, options in ABLATIONS.items():
             rows[name].append(ours.node(case.problem(options), steps))
             print(f"  {case.name} {name:26} {said(rows[name][-1])}", flush=True)
-    whole = np.mean([f.psnr for f in rows["edge + multi (the method)"]])
+    whole = np.mean([f.psnr for f in rows[METHOD]])
     for name, fits in rows.items():
         value = np.mean([f.psnr for f in fits])
         parameters = np.mean([f.parameters for f in fits])

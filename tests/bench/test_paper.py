@@ -1,12 +1,10 @@
 """pxi-bench paper: sections, resuming, and the report."""
 
-import json
 from functools import partial
 
 import numpy as np
 import pytest
 
-from proxyimg_codec.bench import workers
 from proxyimg_codec.bench.paper import (
     SECTIONS,
     explicit,
@@ -24,31 +22,8 @@ from proxyimg_codec.bench.peers import codecs
 from proxyimg_codec.bench.rivals import sines
 from proxyimg_codec.errors import InputError
 from proxyimg_codec.io import raster
+from tests.support.paper import rows_of
 from tests.support.pictures import disc, smooth
-
-TINY = items.Effort(1, 37, 48, 30, 5, 2, 4, 1)
-
-
-@pytest.fixture
-def data(tmp_path):
-    folder = tmp_path / "data"
-    (folder / "kodak").mkdir(parents=True)
-    for name, (width, height) in (("a", (37, 41)), ("b c", (50, 45))):
-        raster.write(folder / "kodak" / f"{name}.png", smooth(width, height))
-    return folder
-
-
-@pytest.fixture
-def here(monkeypatch):
-    """Measures in this process, with little effort."""
-    monkeypatch.setattr(workers, "run", lambda work, tasks, jobs, finished: [
-        finished(work(task)) for task in tasks])  # fmt: skip
-    monkeypatch.setattr(items, "QUICK", TINY)
-
-
-def rows_of(out, section):
-    found = sorted((out / "items" / section).iterdir())
-    return [row for path in found for row in json.loads(path.read_bytes())["rows"]]
 
 
 def test_a_run_from_pictures_to_a_report(tool, data, tmp_path, here):
@@ -68,7 +43,6 @@ def test_a_run_from_pictures_to_a_report(tool, data, tmp_path, here):
     assert text.startswith("# The paper's tables, made again\n\n```\n$ pxi-bench paper --data")
     assert "| ProxyImg (paper) |  | 59955 | 36.99 |" in text
     assert "pxi direct against SIREN, 3 layers, long: " in text
-    assert "does not make yet: differentiable renderers" in text
     page = (out / "report.html").read_text()
     assert "<td>ProxyImg (paper)</td>" in page
     assert "<em>equal time</em>" in page
@@ -101,13 +75,16 @@ def test_explicit(tool, data, tmp_path, here):
     out = tmp_path / "out"
     tool("bench", "paper", "--data", data, "--out", out, "--quick", "--only", "explicit")
     rows = [r for r in rows_of(out, "explicit") if r["folder"] == "emoji"]
-    gaussians, *files = sorted(rows, key=lambda r: r["method"])
-    assert gaussians["parameters"] == 280
-    assert {r["method"] for r in files} == {"WebP", "pxi pyramid", "pxi pyramid, found layers"}
+    by = {r["method"]: r for r in rows}
+    files = {"WebP", "pxi pyramid", "pxi pyramid, found layers"}
+    assert by.keys() - {"VTracer, as few numbers", "VTracer, any number"} == (
+        files | {"2-D Gaussians", "Bézier paths"}
+    )
+    assert by["2-D Gaussians"]["parameters"] == by["Bézier paths"]["parameters"] == 280
     for row in rows:
         assert row["psnr"] == pytest.approx(-10 * np.log10(row["mse"] / 1000), abs=0.01)
-        assert row["psnr"] > (20 if row in files else 3)
-    assert all(row["bytes"] < 1300 for row in files)
+        assert row["psnr"] > (20 if row["method"] in files else 3)
+    assert all(by[m]["bytes"] < 1300 for m in files)
     assert "| icons | ProxyImg (paper) | 0.110 |" in (out / "report.md").read_text()
 
 
@@ -191,7 +168,9 @@ def test_a_failure_leaves_the_rest(data, tmp_path, here):
     run.measure(plan.groups(tmp_path), 1, failed.append)
     assert [f.message for f in failed] == ["implicit, a, two: bad luck"]
     run.write(tmp_path, plan, ["head"])
-    assert "| one |" in (tmp_path / "report.md").read_text()
+    text = (tmp_path / "report.md").read_text()
+    assert "| one |" in text
+    assert "- Only 1 of 3 measurements are there yet." in text
 
 
 def test_results_are_kept(tool, data, tmp_path, here, monkeypatch):
@@ -207,6 +186,14 @@ def test_results_are_kept(tool, data, tmp_path, here, monkeypatch):
     assert "--resume" in tool(*words, code=3).err
     tool(*words, "--resume")
     assert (tmp_path / "out/implicit.csv").read_text() == first
+    (tmp_path / "out/report.md").unlink()
+    tool(*words, "--report")
+    assert "| pxi direct |" in (tmp_path / "out/report.md").read_text()
+    (held,) = (tmp_path / "out/items/implicit").iterdir()
+    held.unlink()
+    tool(*words, "--report")
+    assert "or is to come" in (tmp_path / "out/report.md").read_text()
+    assert not held.exists()
     tool(*words, "--force", "--quiet")
     tool(*words, "--force", "--resume", code=2)
 
@@ -230,7 +217,7 @@ def test_failures_and_interruptions_are_told(tool, data, tmp_path, here, monkeyp
 
 def test_what_is_wrong_is_said(tool, data, tmp_path):
     words = ("bench", "paper", "--out", tmp_path / "out", "--data")
-    assert "explicit, implicit, resolution" in tool(*words, data, "--only", "animation", code=2).err
+    assert "explicit, implicit, compression" in tool(*words, data, "--only", "video", code=2).err
     message = tool(*words, data / "kodak", code=3).err
     assert "holds none of the folders emoji" in message
     message = tool(*words, data / "kodak", "--only", "resolution", code=3).err
@@ -293,4 +280,3 @@ def test_direct_sampling_uses_the_parameters_it_may(parameters):
 def test_help_names_all_sections(tool):
     text = tool("bench", "paper", "--help").out.decode()
     assert all(name in text for name in SECTIONS)
-    assert "not there yet: differentiable" in text

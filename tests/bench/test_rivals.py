@@ -6,9 +6,19 @@ import numpy as np
 import pytest
 import torch
 
+from proxyimg_codec.bench import features
+from proxyimg_codec.bench.measure import psnr
 from proxyimg_codec.bench.paper.implicit import maker
-from proxyimg_codec.bench.rivals import fitting, gaussians, grids, sines
-from tests.support.pictures import smooth
+from proxyimg_codec.bench.rivals import (
+    bezier,
+    fitting,
+    gaussians,
+    grids,
+    quantized,
+    sines,
+    traced,
+)  # fmt: skip
+from tests.support.pictures import disc, smooth
 
 PICTURE = smooth(37, 29)
 
@@ -120,3 +130,96 @@ def test_pictures_at_any_size_agree():
     assert drawn.shape == (20, 30, 3)
     assert (drawn[0, :, 0] == np.rint((np.arange(30) + 0.5) / 30 * 255)).all()
     assert (drawn[:, 0, 1] == np.rint((np.arange(20) + 0.5) / 20 * 255)).all()
+
+
+def flat(width, height):
+    """A red disc on white."""
+    return np.where(disc(width, height)[..., None], np.uint8([220, 60, 40]), np.uint8(255))
+
+
+def test_paths_learn_flat_art():
+    found = bezier.fit(flat(37, 29), 1, 300)
+    assert found.psnr > 25
+    assert found.parameters == 28
+    again = bezier.fit(flat(37, 29), 1, 300)
+    assert (again.psnr, again.shown.tobytes()) == (found.psnr, found.shown.tobytes())
+
+
+def test_paths_start_where_the_picture_is_worst():
+    picture = flat(37, 29)
+    shown = np.full_like(picture, 255)
+    x, y, radius, colour = bezier._worst(picture, shown)
+    assert (x, y) == pytest.approx((18.5, 14.5), abs=1.5)
+    assert 0.3 * 29 - 2 < radius < 0.3 * 29 + 1
+    assert colour == pytest.approx(np.array([220, 60, 40]) / 255, abs=0.06)
+
+
+def test_paths_cover_what_is_inside():
+    paths = bezier.Paths(2, 40, 40)
+    paths.start(20, 18, 10, np.array([0.2, 0.4, 0.6]))
+    at = torch.tensor([[20.0, 18.0], [20.0, 26.0], [20.0, 31.0], [2.0, 2.0]])
+    assert paths.coverage(at).tolist() == [[1, 1, 0, 0]]
+    corners = paths.corners()[0].detach() - torch.tensor([20.0, 18.0])
+    assert 8 < float(corners.norm(dim=1).min()) < float(corners.norm(dim=1).max()) < 10.1
+    edge = (corners[3] + torch.tensor([20.0, 18.0]))[None]
+    assert float(paths.coverage(edge).detach()) == pytest.approx(0.5, abs=0.01)
+    drawn = fitting.picture(paths, 40, 40)
+    assert drawn[18, 20].tolist() == [51, 102, 153]
+    assert drawn[1, 1].tolist() == [255, 255, 255]
+
+
+def test_traced_paths_are_drawn_as_they_are_written():
+    svg = """<path d="M0 0 L10 0 L10 8 L0 8 Z M2 2 L2 4 L4 4 Z " fill="#FF8000" """ + (
+        """transform="translate(5,3)"/>"""
+    )
+    drawn, count = traced.drawn(svg, (20, 24, 3))
+    assert count == 3 + 6 + 4
+    assert drawn[4, 6].tolist() == [255, 128, 0]
+    assert drawn[9, 14].tolist() == [255, 128, 0]
+    assert drawn[13, 6].tolist() == drawn[4, 16].tolist() == [255, 255, 255]
+    path = "M0 0 C0 4 4 8 8 8 C8 4 4 0 0 0 Z "
+    curve = f'<path d="{path}" fill="#000000" transform="translate(0,0)"/>'
+    assert traced.drawn(curve, (9, 9, 3))[1] == 3 + 12
+
+
+def test_outlines_are_traced_within_a_budget():
+    pytest.importorskip("vtracer")
+    picture = flat(64, 48)
+    shown, count = traced.traced(picture, 280)
+    assert count <= 280
+    assert psnr(picture, shown) > 18
+    assert traced.traced(picture, 1)[1] < 100
+
+
+@pytest.mark.parametrize(
+    ("code", "size", "steps"), [(quantized.coin, 8000, 250), (quantized.splats, 1500, 100)]
+)
+def test_rivals_are_coded_in_the_bytes_they_may(code, size, steps):
+    coded = code(PICTURE, size, steps)
+    assert 0.9 * size < coded.size <= size
+    assert psnr(PICTURE, coded.shown) > 22
+
+
+def test_rounding_keeps_the_ends():
+    values = torch.tensor([-1.0, 0.1, 3.0])
+    assert quantized._rounded(values, 1).tolist() == [-1, -1, 3]
+    assert float((quantized._rounded(values, 8) - values).abs().max()) <= 4 / 255 / 2 + 1e-6
+
+
+def test_frechet_distances():
+    """They are nothing for the same blocks, and the formula's for known distributions."""
+    rng = np.random.default_rng(0)
+    noise = rng.integers(0, 255, (64, 80, 3)).astype(np.uint8)
+    stripes = np.repeat(np.uint8(127 + 100 * np.sin(np.mgrid[:64, :80][1] / 3))[..., None], 3, 2)
+    assert features.frechet([noise], [noise]) == pytest.approx(0, abs=1e-6)
+    assert features.frechet([noise], [stripes]) > 10 * features.frechet([noise], [noise[::-1]])
+
+
+def test_frechet_distances_are_those_of_the_formula(monkeypatch):
+    blocks = {0: np.random.default_rng(1).normal(size=(500, 4)), 1: None}
+    blocks[1] = blocks[0] * 2 + 3
+    monkeypatch.setattr(features, "blocks", lambda k: [blocks[k]])
+    spread = float(np.trace(np.cov(blocks[0], rowvar=False)))
+    away = float(((blocks[0].mean(0) + 3) ** 2).sum())
+    # The root of the product of C and 4 C is 2 C, so 1 + 4 - 2 * 2 traces of C are left.
+    assert features.frechet([0], [1]) == pytest.approx(away + spread)

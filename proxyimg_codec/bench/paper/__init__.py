@@ -7,12 +7,11 @@ item yields rows and is kept as a JSON file, so that an interrupted run goes on.
 SECTIONS = {
     "explicit": "explicit representations at ten shapes' worth of parameters",
     "implicit": "implicit representations at equal parameters",
+    "compression": "compression of photographs",
+    "ablations": "ablations and parameter sweeps of node sampling",
+    "editing": "geometry and texture editing",
     "resolution": "resolution freedom",
+    "animation": "animation",
+    "checks": "whether rivals reach their published figures",
 }
-"""Titles of the sections that exist, by name, in the order of the report."""
-
-MISSING = (
-    "differentiable renderers (DiffVG, LIVE) and tracers", "compression", "ablations and sweeps",
-    "geometry and texture editing", "animation",
-)  # fmt: skip
-"""Parts of the paper that have no section yet; reports name them."""
+"""Titles of the sections, by name, in the order of the report."""

@@ -6,10 +6,9 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .items import Earlier, Effort, Item, Pixels, Row
+from .items import Earlier, Effort, Given, Item, Pixels, Row
 from .pictures import crops
 from .tables import Column, Table, mean
 
@@ -96,7 +95,7 @@ TABLE = Table(
 )  # fmt: skip
 
 
-def items(data: Path, effort: Effort) -> list[Item]:
+def items(given: Given, effort: Effort) -> list[Item]:
     """Items of crops of ``kodak/``.
 
     Raises:
@@ -104,7 +103,7 @@ def items(data: Path, effort: Effort) -> list[Item]:
     """
     return [
         item
-        for name, pixels in crops(data / "kodak", effort.pictures, effort.side)
+        for name, pixels in crops(given.data / "kodak", effort.pictures, effort.side)
         for item in _of_picture(name, pixels, effort)
     ]
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..peers import pxi_version
+from . import SECTIONS
 
 Pixels = NDArray[np.uint8]
 
@@ -22,6 +23,21 @@ Row = dict[str, Any]
 
 Earlier = Mapping[str, Sequence[Row]]
 """Rows of the items before, of the same section and picture, by the names of the items."""
+
+
+@dataclass(frozen=True)
+class Given:
+    """Pictures and networks that the user has.
+
+    Attributes:
+        data: Folder with folders of pictures.
+        photos: Folders of photographs to compress, instead of ``photo2k/``.
+        weights: Files or folders of networks that judge pictures, by name.
+    """
+
+    data: Path
+    photos: tuple[Path, ...] = ()
+    weights: Mapping[str, Path] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -37,6 +53,9 @@ class Effort:
         first: Least steps of rivals that are fitted until they converge.
         most: Most steps of these.
         effort: Effort of whole files, 1..9.
+        paths: Optimizer steps of Bézier paths.
+        photo: Side of crops of photographs to compress, in pixels; 0 = whole ones.
+        checked: Optimizer steps of rivals that are compared with published figures.
     """
 
     pictures: int = 24
@@ -47,20 +66,37 @@ class Effort:
     first: int = 1000
     most: int = 4000
     effort: int = 5
+    paths: int = 3000
+    photo: int = 0
+    checked: int = 8000
+
+    @property
+    def few(self) -> int:
+        """Most pictures of sections that measure many variants of one method."""
+        return max(self.pictures // 4, 1)
 
 
 FULL = Effort()
-QUICK = Effort(pictures=2, side=256, width=64, effort=4)
+QUICK = Effort(
+    pictures=2, side=256, width=64, direct=8000, node=600, most=2000, effort=4, paths=600,
+    photo=512, checked=2000,
+)  # fmt: skip
 
 
-@lru_cache(maxsize=1)
-def code_version() -> str:
-    """Versions of the package and of torch, with hashes of the code that measures."""
+@lru_cache
+def code_version(section: str) -> str:
+    """Versions of the package and of torch, with a hash of the code that a section needs.
+
+    What only writes reports, and other sections, may change without measuring again.
+    """
     here, hasher = Path(__file__).parent, hashlib.sha256()
-    for folder in (here, here.parent / "rivals"):
-        for path in sorted(folder.glob("*.py")):
-            if path.stem not in ("report", "charts"):
-                hasher.update(path.read_bytes())
+    apart = {*SECTIONS, "__init__", "charts", "report", "run", "store", "tables"} - {section}
+    files = [path for path in here.glob("*.py") if path.stem not in apart]
+    files += (here.parent / "rivals").glob("*.py")
+    if section == "editing":
+        files += (here.parents[1] / "edit").glob("*.py")
+    for path in sorted(files):
+        hasher.update(path.read_bytes())
     return f"{pxi_version()}, torch {version('torch')}, {hasher.hexdigest()[:10]}"
 
 
@@ -75,7 +111,7 @@ class Item:
         settings: Description of all that results depend on beside picture and code.
         pixels: uint8 [H, W, C] picture.
         measure: Function from the picture and earlier rows to rows; it can be pickled.
-        code: Versions and hashes of the code, when the item was planned.
+        code: Versions and hash of the code, as they were when the item was planned.
     """
 
     section: str
@@ -84,7 +120,11 @@ class Item:
     settings: str
     pixels: Pixels
     measure: Callable[[Pixels, Earlier], list[Row]]
-    code: str = field(default_factory=code_version)
+    code: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.code:
+            object.__setattr__(self, "code", code_version(self.section))
 
     @property
     def key(self) -> dict[str, str]:

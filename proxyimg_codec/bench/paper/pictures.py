@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,7 @@ def crops(folder: Path, most: int, side: int) -> list[tuple[str, Pixels]]:
     Raises:
         InputError: The folder does not exist or has no pictures, or one of them is damaged.
     """
-    return [(p.stem, _centre(rd.load(p)[..., :3], side)) for p in _chosen(folder, most)]
+    return [(p.stem, centre(rd.load(p)[..., :3], side)) for p in _chosen(folder, most)]
 
 
 def over_white(folder: Path, most: int, side: int) -> list[tuple[str, Pixels]]:
@@ -33,11 +34,12 @@ def over_white(folder: Path, most: int, side: int) -> list[tuple[str, Pixels]]:
         if pixels.shape[2] == 4:
             alpha = pixels[..., 3:] / 255.0
             pixels = np.rint(pixels[..., :3] * alpha + 255 * (1 - alpha)).astype(np.uint8)
-        found.append((path.stem, _centre(pixels, side)))
+        found.append((path.stem, centre(pixels, side)))
     return found
 
 
-def _centre(pixels: Pixels, side: int) -> Pixels:
+def centre(pixels: Any, side: int) -> Any:
+    """Central crop [side, side, ...] of a picture or mask; as large as the picture if smaller."""
     y, x = (max(n - side, 0) // 2 for n in pixels.shape[:2])
     return np.ascontiguousarray(pixels[y : y + side, x : x + side])
 

@@ -15,7 +15,6 @@ from pathlib import Path
 from ..._version import __version__
 from ...io.files import write_atomically
 from ..rd import machine
-from . import MISSING
 from .charts import plot
 from .items import Row
 from .tables import Table
@@ -36,6 +35,7 @@ class Part:
         table: Form of its table.
         rows: What was measured.
         absent: Why nothing was measured, instead.
+        measured: Number of measurements that are there, and of all.
     """
 
     name: str
@@ -43,11 +43,14 @@ class Part:
     table: Table
     rows: Sequence[Row]
     absent: str = ""
+    measured: tuple[int, int] = (0, 0)
 
     @property
     def remarks(self) -> list[str]:
-        """Conclusions, then notes."""
-        return [*self.table.conclusions(self.rows), *self.table.notes]
+        """Notes: on what is to come, conclusions, and those of the table."""
+        there, planned = self.measured
+        left = [f"Only {there} of {planned} measurements are there yet."] if there < planned else []
+        return [*left, *self.table.conclusions(self.rows), *self.table.notes]
 
 
 def header(command: str) -> list[str]:
@@ -84,10 +87,6 @@ def to_csv(rows: Sequence[Row]) -> str:
     return out.getvalue()
 
 
-def _without() -> str:
-    return f"Parts of the paper that this command does not make yet: {', '.join(MISSING)}."
-
-
 def markdown(parts: Sequence[Part], head: Sequence[str]) -> str:
     """The report as Markdown."""
     lines = ["# The paper's tables, made again", "", "```", *head, "```", ""]
@@ -103,7 +102,7 @@ def markdown(parts: Sequence[Part], head: Sequence[str]) -> str:
         lines += ["| " + " | ".join(line) + " |" for line in table[1:]]
         lines += ["", f"![{part.title}]({part.name}.svg)", ""]
         lines += [f"- {note}" for note in part.remarks] + [""]
-    return "\n".join([*lines, _without(), ""])
+    return "\n".join(lines)
 
 
 def page(parts: Sequence[Part], head: Sequence[str]) -> str:
@@ -127,7 +126,7 @@ def page(parts: Sequence[Part], head: Sequence[str]) -> str:
         out.append(f"</table><p>{image}</p><ul>")
         out += [f"<li>{_marked(note)}</li>" for note in part.remarks]
         out.append("</ul>")
-    return "\n".join([*out, f"<p>{html.escape(_without())}</p></html>", ""])
+    return "\n".join([*out, "</html>", ""])
 
 
 def _capital(text: str) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import cv2
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...encoder.settings import PRESETS
 from ..measure import ms_ssim, psnr
-from .items import Earlier, Effort, Item, Pixels, Row
+from .items import Earlier, Effort, Given, Item, Pixels, Row
 from .pictures import crops
 from .tables import Column, Table, mean
 
@@ -73,14 +72,14 @@ TABLE = Table(
 )  # fmt: skip
 
 
-def items(data: Path, effort: Effort) -> list[Item]:
+def items(given: Given, effort: Effort) -> list[Item]:
     """Items of crops of ``kodak/``.
 
     Raises:
         InputError: The folder is missing.
     """
     found = []
-    for name, pixels in crops(data / "kodak", effort.pictures, effort.side):
+    for name, pixels in crops(given.data / "kodak", effort.pictures, effort.side):
         for factor in FACTORS:
             for coder in (None, *CODERS):
                 run = partial(_measure, factor=factor, coder=coder, effort=effort.effort)

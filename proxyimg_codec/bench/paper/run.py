@@ -12,7 +12,7 @@ from ...errors import InputError
 from .. import workers
 from ..rd import Failure
 from . import SECTIONS, report, store
-from .items import Effort, Item
+from .items import Effort, Given, Item
 from .tables import Table
 
 
@@ -22,7 +22,7 @@ class _Section(Protocol):
     TABLE: Table
 
     @staticmethod
-    def items(data: Path, effort: Effort) -> list[Item]:
+    def items(given: Given, effort: Effort) -> list[Item]:
         """Items of the section."""
 
 
@@ -44,11 +44,11 @@ class Plan:
         return [g for g in found if any(store.load(out, i) is None for i in g.items)]
 
 
-def plan(data: Path, names: Sequence[str], effort: Effort) -> Plan:
+def plan(given: Given, names: Sequence[str], effort: Effort) -> Plan:
     """Plans sections.
 
     Args:
-        data: Folder with folders of pictures.
+        given: Pictures and networks that the user has.
         names: Names of the sections.
         effort: Amount of work.
 
@@ -58,7 +58,7 @@ def plan(data: Path, names: Sequence[str], effort: Effort) -> Plan:
     made = Plan()
     for name in names:
         try:
-            made.items[name] = _module(name).items(data, effort)
+            made.items[name] = _module(name).items(given, effort)
         except InputError as error:
             made.absent[name] = str(error)
     if not made.items:
@@ -87,9 +87,11 @@ def write(out: Path, made: Plan, head: Sequence[str]) -> None:
     for name, title in SECTIONS.items():
         if name in made.items or name in made.absent:
             items = made.items.get(name, [])
-            rows = [row for item in items for row in store.load(out, item) or []]
-            why = made.absent.get(name, "" if rows else "every measurement failed")
-            parts.append(report.Part(name, title, _module(name).TABLE, rows, why))
+            loaded = [rows for item in items if (rows := store.load(out, item)) is not None]
+            rows = [row for measured in loaded for row in measured]
+            why = made.absent.get(name, "" if rows else "every measurement failed, or is to come")
+            count = (len(loaded), len(items))
+            parts.append(report.Part(name, title, _module(name).TABLE, rows, why, count))
     report.write(out, parts, head)
 
 

@@ -15,8 +15,8 @@ from ..measure import ms_ssim, psnr
 
 Pixels = NDArray[np.uint8]
 
-BATCH_SHARE, BATCH_LEAST = 32, 512
-"""A batch has one of so many pixels of the picture, but at least so many."""
+BATCH_SHARE, BATCH_LEAST, BATCH_MOST = 32, 512, 1 << 14
+"""A batch has one of so many pixels of the picture, but at least and at most so many."""
 
 CHUNK = 1 << 14
 """Pixels evaluated at a time."""
@@ -79,14 +79,24 @@ def fit(make: Maker, pixels: Pixels, steps: int, seed: int = 0) -> Fitted:
         steps: Number of optimizer steps.
         seed: Seed of initial parameters and batches.
     """
+    rival, seconds = trained(make, pixels, steps, seed)
+    shown = picture(rival, *pixels.shape[:2])
+    count = rival.parameters_used
+    quality = psnr(pixels, shown), ms_ssim(pixels, shown)
+    return Fitted(*quality, count, steps, seconds, shown)
+
+
+def trained(make: Maker, pixels: Pixels, steps: int, seed: int = 0) -> tuple[Rival, float]:
+    """Fits a rival as `fit` does, and returns it with the CPU seconds that it took."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
         started = time.process_time()
         rival = make()
         place = places(*pixels.shape[:2])
         target = torch.from_numpy(pixels.reshape(-1, 3) / np.float32(255))
-        adam = torch.optim.Adam(rival.parameters(), lr=rival.rate, betas=(0.9, 0.99))
-        batch = min(max(len(place) // BATCH_SHARE, BATCH_LEAST), len(place))
+        learned = [p for p in rival.parameters() if p.requires_grad]
+        adam = torch.optim.Adam(learned, lr=rival.rate, betas=(0.9, 0.99))
+        batch = min(max(len(place) // BATCH_SHARE, BATCH_LEAST), BATCH_MOST, len(place))
         order = torch.empty(0, dtype=torch.long)
         for step in range(steps):
             if len(order) < batch:
@@ -98,10 +108,7 @@ def fit(make: Maker, pixels: Pixels, steps: int, seed: int = 0) -> Fitted:
             loss.backward()
             adam.step()
         seconds = time.process_time() - started
-    shown = picture(rival, *pixels.shape[:2])
-    count = rival.parameters_used
-    quality = psnr(pixels, shown), ms_ssim(pixels, shown)
-    return Fitted(*quality, count, steps, seconds, shown)
+    return rival, seconds
 
 
 def fit_converged(make: Maker, pixels: Pixels, first: int, most: int) -> Fitted:

@@ -46,6 +46,9 @@ class NodeOptions:
             of barycentrically; an experiment that no file can store.
         own_codes: Whether each node has a code of its own instead of a sample of the plane; an
             experiment that no file can store.
+        dim: Features of a code.
+        hidden: Width of the hidden layers of the network.
+        depth: Number of hidden layers.
 
     Raises:
         UsageError: There is neither a local nor a global feature, or `local` is unknown.
@@ -58,6 +61,9 @@ class NodeOptions:
     back_grid: int = BACK_GRID
     distance: bool = False
     own_codes: bool = False
+    dim: int = DIM
+    hidden: int = HIDDEN
+    depth: int = DEPTH
 
     def __post_init__(self) -> None:
         if self.local not in ("multi", "single", "none") or not (self.edge or self.meshed):
@@ -70,7 +76,8 @@ class NodeOptions:
 
     def network(self, channels: int) -> NetShape:
         """Sizes of the decoder network, with 3 or 4 output channels."""
-        return NetShape(DIM * (self.edge + self.meshed), self.octaves, HIDDEN, DEPTH, channels)
+        features = self.dim * (self.edge + self.meshed)
+        return NetShape(features, self.octaves, self.hidden, self.depth, channels)
 
     def grid(self, plane: Plane, back: bool) -> tuple[int, int]:
         """Columns and rows of a plane; `back` if its layer is the back one of several."""

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks import consistency as c
+from proxyimg_codec.bench import consistency as c
+from proxyimg_codec.bench.features import distance
 from proxyimg_codec.edit.transforms import meshed
 from proxyimg_codec.geometry.mesh import FRACTION_BITS
 from proxyimg_codec.geometry.track import Timeline, Track
@@ -80,7 +81,7 @@ def test_distance_in_gradients():
     y, x = np.mgrid[:64, :96]
     stripes = np.repeat(np.uint8(127 + 100 * np.sin(x / 3.0))[..., None], 3, 2)
     other = np.repeat(np.uint8(127 + 100 * np.sin(y / 3.0))[..., None], 3, 2)
-    assert (c.distance(stripes, stripes) == 0).all()
+    assert (distance(stripes, stripes) == 0).all()
     brighter = np.uint8(stripes * 0.8 + 20)
-    assert (c.distance(stripes, brighter) < 0.1).all()
-    assert (c.distance(stripes, other) > 0.8).all()
+    assert (distance(stripes, brighter) < 0.1).all()
+    assert (distance(stripes, other) > 0.8).all()
