@@ -25,6 +25,7 @@ struct Refine {
     const float *axis;                  // [2][2][5]
     int32_t levels, rows, columns, rounds, threads;
     int32_t done;                       // rounds that were made before
+    int32_t sure;                       // rounds that lower the cost, so that it is not computed
     int32_t ramp;                       // rounds after which only the best moves around are made
     float step, price, share, hesitation;  // as in refine.py
     float *const *slopes;               // of the same shapes as the latents
@@ -214,6 +215,11 @@ class Refiner {
         want();
         double lowest = INFINITY;
         for (int turn = 0;; turn++) {
+            if (turn && turn == s.rounds && s.done + turn < s.sure) {
+                keep();
+                if (s.watch) s.watch(turn, s.rounds);
+                break;
+            }
             forward();
             const double total = error() + s.price * spent();
             if (total < lowest) lowest = total, keep();

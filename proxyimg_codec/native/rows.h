@@ -71,20 +71,30 @@ class Sum {
     static constexpr int OUTS = 4, WIDE = 3;  // fills 16 registers
     std::vector<float> weights, biases;       // [blocks][terms][OUTS], [blocks][OUTS]
 
-    template <int V, class Out> void block(const float *const *in, int used, int x, Out &out) const {
-        for (int b = 0; b < blocks; b++) {
-            vec acc[OUTS][V];
-            for (int o = 0; o < OUTS; o++)
-                for (int j = 0; j < V; j++) acc[o][j] = all(biases[b * OUTS + o]);
-            const float *w = weights.data() + (size_t)b * terms * OUTS;
-            for (int k = 0; k < used; k++, w += OUTS) {
-                vec v[V];
-                for (int j = 0; j < V; j++) v[j] = load(in[k] + x + j * LANES);
-                for (int o = 0; o < OUTS; o++)
-                    for (int j = 0; j < V; j++) acc[o][j] += v[j] * w[o];
+    // Not a part of what calls it, where one of the sums would find no register.
+    template <int V>
+    __attribute__((noinline)) static void add(const float *const *in, const float *w, int used, int x, const float *bias,
+                                              vec *out) {
+        vec acc[OUTS][V];
+        for (int o = 0; o < OUTS; o++)
+            for (int j = 0; j < V; j++) acc[o][j] = all(bias[o]);
+        for (int k = 0; k < used; k++, w += OUTS) {
+            vec v[V];
+            for (int j = 0; j < V; j++) v[j] = load(in[k] + x + j * LANES);
+            for (int o = 0; o < OUTS; o++) {
+                const vec factor = all(w[o]);
+                for (int j = 0; j < V; j++) acc[o][j] += v[j] * factor;
             }
+        }
+        for (int o = 0; o < OUTS; o++)
+            for (int j = 0; j < V; j++) out[o * V + j] = acc[o][j];
+    }
+    template <int V, class Out> void block(const float *const *in, int used, int x, Out &out) const {
+        vec sums[OUTS * V];
+        for (int b = 0; b < blocks; b++) {
+            add<V>(in, weights.data() + (size_t)b * terms * OUTS, used, x, biases.data() + b * OUTS, sums);
             for (int o = 0; o < OUTS && b * OUTS + o < outputs; o++)
-                for (int j = 0; j < V; j++) out(b * OUTS + o, x + j * LANES, acc[o][j]);
+                for (int j = 0; j < V; j++) out(b * OUTS + o, x + j * LANES, sums[o * V + j]);
         }
     }
 

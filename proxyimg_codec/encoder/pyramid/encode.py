@@ -16,7 +16,7 @@ from ...texture.latents import Latents
 from ...texture.network import Floats
 from ...texture.planes import Planes
 from . import engine_native
-from .goal import DEAD_ZONE, LEVELS, Effort, Goal, shrunk
+from .goal import DEAD_ZONE, LEVELS, Effort, Goal, shrink
 from .shifts import best_shift
 from .window import Window, windows
 
@@ -162,7 +162,9 @@ class Job:
 
     def _analysed(self) -> list[Floats]:
         """Latents to begin with, not rounded."""
-        return self.supported(shrunk(self.analysis(self.picture), DEAD_ZONE))
+        found = self.analysis(self.picture)
+        shrink(found, DEAD_ZONE)
+        return self.supported(found)
 
     def supported(self, latents: list[Floats]) -> list[Floats]:
         """Latents with 0 where they must be 0."""

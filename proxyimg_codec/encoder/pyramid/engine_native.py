@@ -28,7 +28,7 @@ from ...texture.registered_model import (
 from ...texture.synthesis import axis_filters, wavelet
 from ...texture.watch import WATCH
 from .filters import analysis_wavelet
-from .goal import FIRST_SHARE, HESITATION, RAMP, Effort, Goal
+from .goal import FIRST_SHARE, HESITATION, RAMP, SURE, Effort, Goal
 from .shifts import SHIFTS
 
 CONTEXT = (
@@ -60,7 +60,7 @@ class _Refine(ct.Structure):
         *((n, ct.c_void_p) for n in ("colour", "axis")),
         *(
             (n, ct.c_int32)
-            for n in ("levels", "rows", "columns", "rounds", "threads", "done", "ramp")
+            for n in ("levels", "rows", "columns", "rounds", "threads", "done", "sure", "ramp")
         ),
         *((n, ct.c_float) for n in ("step", "price", "share", "hesitation")),
         *((n, ct.c_void_p) for n in ("slopes", "cost")),
@@ -150,7 +150,8 @@ class Task:
             colour=self._array(colour), axis=self._array(axis_filters().astype(np.float32)),
             levels=count, rows=rows, columns=columns, threads=threads, ramp=RAMP,
             step=2.0 ** (goal.step / 64), price=goal.price, share=FIRST_SHARE,
-            hesitation=HESITATION, done=goal.done, **fields,
+            hesitation=HESITATION, done=goal.done, sure=SURE,
+            **fields,
         )  # fmt: skip
 
     def _array(self, array: NDArray[Any] | None) -> int | None:
@@ -191,7 +192,9 @@ def analysed(number: int, picture: Floats, step: int, grid: Grid, threads: int) 
         LimitError: The kernel cannot allocate what it needs.
     """
     sets = analysis_weights(number, step)
-    low = np.tensordot(sets[0]["to_planes"] / np.float32(2.0 ** (step / 64)), picture - 128, 1)
+    matrix = sets[0]["to_planes"] / np.float32(2.0 ** (step / 64))
+    low = np.tensordot(matrix, picture, 1)
+    low -= 128 * matrix.sum(1)[:, None, None]
     found = []
     for level in range(1, grid.levels + 1):
         own = sets[min(level, len(sets)) - 1]
@@ -203,8 +206,9 @@ def analysed(number: int, picture: Floats, step: int, grid: Grid, threads: int) 
         )  # fmt: skip
         _call("pyramid_analysis", task)
         low, high = out[:3], out[3:]
-        found.append(high / own["gain"][:, None, None])
-    return [*found, low]
+        high /= own["gain"][:, None, None]
+        found.append(high)
+    return [*found, low.copy()]
 
 
 def improved(

@@ -15,9 +15,10 @@ from .shifts import SHIFTS
 from .window import windows
 
 try:
-    import torch
-    from torch import Tensor
-
+    # Threads of OpenMP spin, unless OMP_WAIT_POLICY says otherwise when torch is imported; beside
+    # one busy process, encoding then takes 5 to 10 times as long. No call changes that later, so a
+    # program that imports torch before this module sets the variable itself.
+    from ..yielding import torch
     from . import refine
     from .load import load
     from .model import LOG_SCALES
@@ -35,13 +36,13 @@ SPARSE = 3
 """Distance of the latents, across and down, from which shifts of the scale index are found."""
 
 
-def tensor(values: NDArray[np.floating]) -> Tensor:
+def tensor(values: NDArray[np.floating]) -> torch.Tensor:
     """Tensor float32 [1, C, H, W] of an array [C, H, W], with channels last in memory."""
     whole = torch.from_numpy(np.ascontiguousarray(values, np.float32))[None]
     return whole.contiguous(memory_format=torch.channels_last)
 
 
-def arrays(found: Sequence[Tensor]) -> list[Floats]:
+def arrays(found: Sequence[torch.Tensor]) -> list[Floats]:
     """Arrays float32 [C, h, w] of tensors [1, C, h, w]."""
     return [np.ascontiguousarray(y.detach()[0].numpy()) for y in found]
 

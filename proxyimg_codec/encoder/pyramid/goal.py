@@ -27,6 +27,9 @@ FIRST_SHARE, RAMP = 0.4, 6
 """Share of the best gain around a latent that its own move has to gain, in the first round; it
 rises to 1 in so many rounds."""
 
+SURE = 4
+"""First round that may fail to lower the cost; after those before, it is not computed."""
+
 LEAST_GAIN, HESITATION = 1e-3, 0.05
 """Least gain of a move, in squares of the step, and of a move that takes back the last one."""
 
@@ -87,6 +90,7 @@ class Goal(NamedTuple):
         return out
 
 
-def shrunk(latents: Sequence[Floats], by: float) -> list[Floats]:
-    """Moves latents towards zero by at most `by`; the lowest planes, which are last, stay."""
-    return [y - np.clip(y, -by, by) for y in latents[:-1]] + [latents[-1]]
+def shrink(latents: Sequence[Floats], by: float) -> None:
+    """Moves latents towards zero by at most `by`, in place; the lowest planes, the last, stay."""
+    for y in latents[:-1]:
+        y -= np.clip(y, -by, by)

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from .goal import FIRST_SHARE, HESITATION, LEAST_GAIN, RAMP, RATE_WEIGHT
+from .goal import FIRST_SHARE, HESITATION, LEAST_GAIN, RAMP, RATE_WEIGHT, SURE
 from .model import Likelihood, Model
 from .rate import around, bits, bits_of_integers
 from .similarity import ms_ssim
@@ -205,6 +205,8 @@ def improved(
     best, least = now, math.inf
     last = [torch.zeros_like(y) for y in now]
     for turn in range(rounds + 1):
+        if 0 < turn == rounds and done + turn < SURE:
+            return now
         ys = [y.clone().requires_grad_(True) for y in now]
         with torch.set_grad_enabled(turn < rounds):
             spent = cost(model, target, ys, smooth=False)

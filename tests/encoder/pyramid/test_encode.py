@@ -147,9 +147,9 @@ def test_shifts_take_the_fewest_bits(monkeypatch, engine):
     latents = [torch.round(torch.from_numpy(y))[None] for y in job.latents]
     likely = load(2).likelihoods(latents, torch.tensor([2.0 ** (256 / 64)]))
     few = slice(None, None, engine_torch.SPARSE)
-    across = few if engine == "torch" else slice(None)
     for k, (y, p) in enumerate(zip(latents, likely, strict=False)):
         for group, at in enumerate((slice(3), slice(3, 9))):
+            across = few if engine == "torch" else slice(None)
             y_, mean, scale = (v[:, at, few, across] for v in (y, *p))
             spent = {
                 s: rate.bits_of_integers(y_, mean, (scale + s / 8).clamp(-4, 3.875)).sum().item()
