@@ -5,7 +5,6 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 
-import numpy as np
 import pytest
 import torch
 
@@ -14,7 +13,7 @@ from proxyimg_codec.encoder import settings
 from proxyimg_codec.encoder.implicit.fit_torch import interpolate
 from proxyimg_codec.encoder.pyramid import engine_torch, refine
 from proxyimg_codec.encoder.pyramid import picture as pyramid
-from proxyimg_codec.encoder.pyramid.encode import EFFORTS, Job, Raster
+from proxyimg_codec.encoder.pyramid.encode import EFFORTS
 from proxyimg_codec.encoder.pyramid.goal import Effort
 from proxyimg_codec.encoder.shapes import chamfer
 from proxyimg_codec.native import kernel
@@ -179,11 +178,9 @@ def test_torch_threads_do_not_change_sums(torch_threads):
 
 
 def test_torch_threads_do_not_change_shifts(torch_threads):
-    samples = smooth(173, 211)[..., :3].astype(np.float32)
-    job = Job(2, Raster(samples), 250, 1)
-    goal = job._goal(job.windows()[0], job.latents)
-    latents = [np.rint(y) for y in job.latents]
-    torch_threads(lambda: torch.from_numpy(engine_torch.bits_by_shift(goal, latents, 1)))
+    random = torch.Generator().manual_seed(2)
+    offset, scale = (torch.randn(1, 9, 211, 173, generator=random) for _ in range(2))
+    torch_threads(lambda: torch.from_numpy(engine_torch.bits_of(offset, scale, torch.ones(1))))
 
 
 def test_torch_threads_do_not_change_gradients_of_codes(torch_threads):

@@ -134,8 +134,15 @@ def bits_by_shift(goal: Goal, latents: Sequence[Floats], threads: int) -> NDArra
     for k, p in enumerate(likely):
         y, mean, scale = (v[few] for v in (own[k], *p))
         mask = torch.ones(1) if goal.support is None else tensor(goal.support[k])[few]
-        for i, shift in enumerate(SHIFTS):
-            bits = bits_at(y - mean, (scale + shift / 8).clamp(*LOG_SCALES)) * mask
-            spent = bits.sum((0, 2, 3))  # the same for any number of threads
-            out[2 * k : 2 * k + 2, i] = float(spent[:3].sum()), float(spent[3:].sum())
+        spent = bits_of(y - mean, scale, mask)
+        out[2 * k], out[2 * k + 1] = spent[:, :3].sum(1), spent[:, 3:].sum(1)
     return out
+
+
+def bits_of(offset: torch.Tensor, log_scale: torch.Tensor, mask: torch.Tensor) -> Floats:
+    """Bits float32 [16, C] of latents [1, C, h, w] of each channel under each shift."""
+    out = []
+    for shift in SHIFTS:
+        bits = bits_at(offset, (log_scale + shift / 8).clamp(*LOG_SCALES)) * mask
+        out.append(bits.sum((2, 3))[0].numpy())  # the same for any number of threads
+    return np.stack(out)
