@@ -66,7 +66,7 @@ class BuildLevels(build_ext):
         """Compiles each source for each level, and links."""
         objects = []
         for level, target in LEVELS.items():
-            for source, maths in (("kernel.cpp", EXACT), ("train.cpp", FAST)):
+            for source, maths in (("kernel.cpp", EXACT), ("refine.cpp", FAST), ("train.cpp", FAST)):
                 objects += self._compiled(source, level, [*maths, *target])
         objects += self._compiled("levels.cpp", next(iter(LEVELS)), next(iter(LEVELS.values())))
         self.compiler.link_shared_object(

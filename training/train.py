@@ -13,16 +13,10 @@ import torch
 from torch import Tensor, nn
 
 from proxyimg_codec.encoder.pyramid.convolutions import Residual
+from proxyimg_codec.encoder.pyramid.goal import DEAD_ZONE, RATE_WEIGHT
 from proxyimg_codec.encoder.pyramid.model import Level, Model
 from proxyimg_codec.encoder.pyramid.rate import bits_of_integers
-from proxyimg_codec.encoder.pyramid.refine import (
-    DEAD_ZONE,
-    RATE_WEIGHT,
-    Target,
-    cost,
-    moved,
-    shrunk,
-)
+from proxyimg_codec.encoder.pyramid.refine import Target, cost, moves
 
 from .pictures import Pixels, crop, load
 
@@ -211,10 +205,12 @@ def refined(model: Model, pictures: list[Pixels], state: dict[str, Any], args: A
     journal = Journal(model, opt, state, args)
     while journal.done < args.steps:
         x, step = batch(pictures, journal.rng(), args.range)
-        random = torch.Generator().manual_seed(journal.done)
         target = Target(x, None, None, None, step)
         with torch.no_grad():
-            now = [torch.round(y) for y in shrunk(model.analyse(x, step), DEAD_ZONE)]
+            *found, lowest = model.analyse(x, step)
+            small = [y - y.clamp(-DEAD_ZONE, DEAD_ZONE) for y in found]
+            now = [torch.round(y) for y in (*small, lowest)]
+        last = [torch.zeros_like(y) for y in now]
         for turn in range(ROUNDS):
             ys = [y.contiguous(memory_format=torch.channels_last).requires_grad_() for y in now]
             spent = cost(model, target, ys, smooth=False)
@@ -222,7 +218,9 @@ def refined(model: Model, pictures: list[Pixels], state: dict[str, Any], args: A
             spent.total.backward()  # type: ignore[no-untyped-call]
             slopes = [y.grad for y in ys if y.grad is not None]
             ys = [y.detach() for y in ys]
-            now = moved(model, step, ys, spent.likely, slopes, random, settle=turn == 0)
+            changes = moves(model, target, ys, spent.likely, slopes, turn, last)
+            last = [torch.where(c != 0, c, v) for c, v in zip(changes, last, strict=True)]
+            now = [y + c for y, c in zip(ys, changes, strict=True)]
             if turn > 0:  # latents of the first round are not refined, unlike those of a file
                 journal.set_rates()
                 torch.nn.utils.clip_grad_norm_(kept, 2e5)

@@ -138,7 +138,7 @@ class PyramidParameters:
         samples = np.clip(samples, 0, 255).astype(np.float32)
         whole = self._placed(samples, weight, None if cells.all() else cells)
         length = EFFORTS[effort - 1]
-        work = max(whole.samples[..., 0].size * (length.steps + length.rounds), 1)
+        work = max(whole.samples[..., 0].size * length.turns(whole.structural), 1)
         done = 0
 
         def tick(samples: int) -> None:

@@ -90,6 +90,10 @@ _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "pxi_premultiplied": (None, [_ADDRESS, _INT, _LONG, _ADDRESS]),
     "pxi_painted": (None, [_ADDRESS]),
     "pxi_finished": (None, [_ADDRESS, _INT, _LONG, _INT, _INT, _ADDRESS]),
+    "pxi_refine": (ct.c_int, [_ADDRESS]),
+    "pxi_refine_slopes": (ct.c_int, [_ADDRESS]),
+    "pxi_refine_tally": (ct.c_int, [_ADDRESS]),
+    "pxi_pyramid_analysis": (ct.c_int, [_ADDRESS]),
     "pxi_train": (ct.c_double, [*(_ADDRESS,) * 2, *(_LONG,) * 3, *(_ADDRESS,) * 2]),
 }  # fmt: skip
 """Types of result and arguments of each function; structures of other modules are addresses."""

@@ -3,11 +3,13 @@
 
 #include <atomic>
 
+#include "level.h"
+
 #if defined(__SSE__)
 #include <xmmintrin.h>
 #endif
 
-namespace {
+namespace PXI_LEVEL {
 
 // Fading moments end as denormal numbers, which are a hundred times slower: treated as zero while
 // this object lives, in this thread only.
@@ -40,4 +42,4 @@ class Barrier {
     }
 };
 
-}  // namespace
+}  // namespace PXI_LEVEL

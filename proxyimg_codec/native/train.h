@@ -17,6 +17,8 @@
 #include "gradients.h"
 #include "threads.h"
 
+using namespace PXI_LEVEL;
+
 static const int PARTS = 4;
 
 struct Train {

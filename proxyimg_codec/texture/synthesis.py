@@ -23,6 +23,21 @@ _LOW = (0.788485616406, 0.418092273222, -0.040689417609, -0.064538882629)
 _HIGH = (0.852698679009, -0.377402855613, -0.110624404418, 0.023849465020, 0.037828455507)
 
 
+def axis_filters() -> NDArray[np.float64]:
+    """Synthesis filters of the CDF 9/7 wavelet along an axis, float64 [2, 2, 5].
+
+    Weight [band, phase, tap] is that of sample m + tap - 2 of the low or high band in output
+    2 m + phase.
+    """
+    axis = np.zeros((2, 2, 5))
+    for phase in range(2):
+        for tap in range(5):
+            n = phase - 2 * (tap - 2)
+            axis[0, phase, tap] = _LOW[abs(n)] if abs(n) < 4 else 0
+            axis[1, phase, tap] = _HIGH[abs(n - 1)] if abs(n - 1) < 5 else 0
+    return axis
+
+
 @functools.cache
 def wavelet() -> NDArray[np.float64]:
     """Synthesis weights of the CDF 9/7 wavelet as a convolution, float64 [12, 12, 5, 5].
@@ -30,12 +45,7 @@ def wavelet() -> NDArray[np.float64]:
     Output 4 * colour + 2 * y + x is sample (y, x) of the 2 x 2 samples that a position gives. Input
     c is the low band of colour c; input 3 + 3 * band + colour is a high band.
     """
-    axis = np.zeros((2, 2, 5))  # [band, phase, tap]
-    for phase in range(2):
-        for tap in range(5):
-            n = phase - 2 * (tap - 2)
-            axis[0, phase, tap] = _LOW[abs(n)] if abs(n) < 4 else 0
-            axis[1, phase, tap] = _HIGH[abs(n - 1)] if abs(n - 1) < 5 else 0
+    axis = axis_filters()
     out = np.zeros((12, 12, 5, 5))
     for colour in range(3):
         for y in range(2):

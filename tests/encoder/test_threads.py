@@ -11,10 +11,10 @@ import torch
 import proxyimg_codec as pxi
 from proxyimg_codec.encoder import settings
 from proxyimg_codec.encoder.implicit.fit_torch import interpolate
+from proxyimg_codec.encoder.pyramid import engine_torch, refine
 from proxyimg_codec.encoder.pyramid import picture as pyramid
-from proxyimg_codec.encoder.pyramid import refine
-from proxyimg_codec.encoder.pyramid.encode import EFFORTS, Effort
-from proxyimg_codec.encoder.pyramid.shifts import Sample
+from proxyimg_codec.encoder.pyramid.encode import EFFORTS
+from proxyimg_codec.encoder.pyramid.goal import Effort
 from proxyimg_codec.encoder.shapes import chamfer
 from proxyimg_codec.native import kernel
 from tests.support.paths import ROOT
@@ -127,7 +127,7 @@ ENCODE = """
 import cv2, numpy, os
 import proxyimg_codec as pxi
 before = dict(os.environ)
-pxi.encode(numpy.arange(192, dtype=numpy.uint8).reshape(8, 8, 3), effort=1)
+pxi.encode(numpy.arange(192, dtype=numpy.uint8).reshape(8, 8, 3), effort=1, tune="ms-ssim")
 assert dict(os.environ) == before
 """
 TOOL = """
@@ -146,7 +146,7 @@ sys.exit(encode.main(sys.argv[1:]))
 )
 def test_threads_wait_without_spinning_unless_somebody_asks_for_it(tmp_path, set_by_user, policy):
     (tmp_path / "a.ppm").write_bytes(b"P6 8 8 255 " + bytes(range(192)))
-    tool = (tmp_path / "a.ppm", "-e", "1", "--quiet")
+    tool = (tmp_path / "a.ppm", "-e", "1", "--tune", "ms-ssim", "--quiet")
     for script, args in ((ENCODE, ()), (TOOL, tool)):
         said = process(script, *args, OMP_DISPLAY_ENV="VERBOSE", **set_by_user)
         lines = [line.split("=")[1].strip(" '") for line in said.splitlines() if
@@ -179,9 +179,8 @@ def test_torch_threads_do_not_change_sums(torch_threads):
 
 def test_torch_threads_do_not_change_shifts(torch_threads):
     random = torch.Generator().manual_seed(2)
-    offset, scale = (torch.randn(1, 6, 211, 173, generator=random) for _ in range(2))
-    part = Sample(offset, scale, torch.ones(1, 6, 1, 1))
-    torch_threads(lambda: torch.tensor([part.bits(shift) for shift in (-1, 0, 1)]))
+    offset, scale = (torch.randn(1, 9, 211, 173, generator=random) for _ in range(2))
+    torch_threads(lambda: torch.from_numpy(engine_torch.bits_of(offset, scale, torch.ones(1))))
 
 
 def test_torch_threads_do_not_change_gradients_of_codes(torch_threads):

@@ -1,3 +1,1 @@
-"""Encoder of pyramid textures: the model in torch, and rate-distortion refinement of latents."""
-
-from ..yielding import torch as torch
+"""Encoder of pyramid textures: the model, and rate-distortion refinement of latents."""

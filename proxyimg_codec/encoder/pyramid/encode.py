@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Sequence
+from types import ModuleType
+from typing import Any, NamedTuple
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
+from ...native import kernel
 from ...texture import planes as coded
 from ...texture.grid import Grid, by_channel
 from ...texture.latents import Latents
 from ...texture.network import Floats
 from ...texture.planes import Planes
-from . import refine
-from .load import load
-from .model import LEVELS, Model
-from .refine import Target
-from .shifts import Sample, best_shift
-from .window import Window
+from . import engine_native
+from .goal import DEAD_ZONE, LEVELS, Effort, Goal, shrink
+from .shifts import best_shift
+from .window import Window, windows
 
 NUMBER = 2
 """Number of the registered model that is used."""
@@ -28,34 +26,14 @@ NUMBER = 2
 CELL = 3
 """Base-2 logarithm of the side of a cell of the support, in samples."""
 
-WINDOW, MARGIN = 768, 64
-"""Side of a window in samples, and margin that it sees beyond that; refinement in windows bounds
-memory."""
-
-REACH = 256
-"""Samples that the analysis of a window sees beyond it, as many as its coarsest filters reach."""
-
-SPARSE = 3
-"""Distance of the latents, across and down, from which shifts of the scale index are found."""
-
-
-class Effort(NamedTuple):
-    """Duration of refinement.
-
-    Attributes:
-        steps: Steps with stochastic rounding.
-        rounds: Rounds of moves by one after them.
-    """
-
-    steps: int
-    rounds: int
-
-
 EFFORTS = (
-    Effort(0, 1), Effort(0, 2), Effort(0, 6), Effort(0, 15), Effort(0, 45), Effort(0, 80),
-    Effort(0, 140), Effort(50, 150), Effort(300, 200),
+    Effort(1, 1), Effort(2, 2), Effort(6, 3), Effort(15, 4), Effort(45, 6), Effort(80, 10),
+    Effort(140, 16), Effort(200, 25), Effort(500, 40),
 )  # fmt: skip
 """Duration of refinement at effort 1..9."""
+
+TRIAL = 2
+"""Rounds after which the shifts of the scale index are found again, if at least as many follow."""
 
 
 class Raster(NamedTuple):
@@ -88,8 +66,9 @@ def levels_for(size: tuple[int, int]) -> int:
 
 
 def encode(
-    raster: Raster, step: int, effort: Effort, seed: int, tick: Callable[[int], None]
-) -> tuple[Planes, bool]:
+    raster: Raster, step: int, effort: Effort, seed: int, tick: Callable[[int], None],
+    threads: int = 2,
+) -> tuple[Planes, bool]:  # fmt: skip
     """Encodes a raster.
 
     On `KeyboardInterrupt`, in `tick` or elsewhere, refinement stops and its results so far are
@@ -101,57 +80,72 @@ def encode(
         effort: Duration of refinement.
         seed: Seed of all random numbers.
         tick: Called with the number of samples of a window after each step of its refinement.
+        threads: Number of threads; results do not depend on it.
 
     Returns:
         The planes, and whether refinement ran to its end.
+
+    Raises:
+        LimitError: There is not enough memory.
+        UnsupportedError: torch is needed and not installed.
     """
-    model = load(NUMBER)
-    job = Job(model, raster, step)
+    job = Job(NUMBER, raster, step, threads)
     complete = True
-    random = torch.Generator().manual_seed(seed)  # that of torch belongs to the whole process
     try:
-        for window in job.windows():
-            if job.holds(window):
-                job.refine(window, effort, seed, random, tick)
-            else:
-                tick(window.samples * (effort.steps + effort.rounds))
+        for part in job.parts(effort):
+            for window in job.windows():
+                if job.holds(window):
+                    job.refine(window, part, seed, tick)
+                else:
+                    tick(window.samples * part.turns(raster.structural))
     except KeyboardInterrupt:
         complete = False
     return job.planes(), complete
+
+
+def engine(structural: bool = False) -> ModuleType:
+    """Module that refines latents: the compiled kernel, else torch, which also aims at MS-SSIM."""
+    if kernel.available() and not structural:
+        return engine_native
+    from . import engine_torch
+
+    return engine_torch
 
 
 class Job:
     """Latents of a raster that are being refined.
 
     Attributes:
-        picture: [1, 3, rows, columns] samples.
-        weight: [1, 1, rows, columns] weights; None = 1.
-        support: For each level, then for the lowest planes, a mask [1, channels, h, w], 0 for
+        picture: float32 [3, rows, columns] samples.
+        support: For each level, then for the lowest planes, a float32 mask [channels, h, w], 0 for
             latents that must be 0; None = all 1.
-        latents: Latents of levels 1, 2, ..., then the lowest planes.
+        latents: Latents of levels 1, 2, ..., then the lowest planes, float32 [channels, h, w].
         shifts: Shifts of the scale index.
         grid: Sizes of the planes.
         count: Number of levels.
+        done: Rounds of moves that were made.
 
     Args:
-        model: The model.
+        number: Number of the registered model.
         raster: The raster.
         step: Index s of the quantization step 2**(s / 64).
+        threads: Number of threads.
         grid: Sizes of the planes; by default those of a new raster.
     """
 
-    def __init__(self, model: Model, raster: Raster, step: int, grid: Grid | None = None) -> None:
-        self.model, self.raster, self.step_index = model, raster, step
-        self.step = torch.tensor([2.0 ** (step / 64)])
+    def __init__(
+        self, number: int, raster: Raster, step: int, threads: int = 2, grid: Grid | None = None
+    ) -> None:
+        self.number, self.raster, self.step, self.threads = number, raster, step, threads
         self.grid = grid or Grid(raster.size, levels_for(raster.size))
         self.count = self.grid.levels
-        self.picture = tensor(raster.samples.transpose(2, 0, 1))
-        self.weight = None if raster.weight is None else tensor(raster.weight[None])
+        self.picture = np.ascontiguousarray(raster.samples.transpose(2, 0, 1), np.float32)
         self.support = self._support()
         self.latents = self._analysed()
-        self.shifts = self._shifts()
+        self.done = 0
+        self.shifts: tuple[int, ...] = self._shifts()
 
-    def _support(self) -> list[Tensor] | None:
+    def _support(self) -> list[Floats] | None:
         r = self.raster
         unit = 1 << self.count
         if r.cells is None and not r.grey and r.size[0] % unit == r.size[1] % unit == 0:
@@ -161,47 +155,37 @@ class Job:
         for level in range(1, self.count + 1):
             mask = by_channel(self.grid.bands(cells, CELL, level))
             mask[3:] &= not r.grey
-            masks.append(tensor(mask.astype(np.float32)))
+            masks.append(mask.astype(np.float32))
         lowest = np.ones((3, *mask.shape[1:]), np.float32)
         lowest[1:] *= not r.grey
-        return [*masks, tensor(lowest)]
+        return [*masks, lowest]
 
-    def _analysed(self) -> list[Tensor]:
+    def _analysed(self) -> list[Floats]:
         """Latents to begin with, not rounded."""
-        return self.supported(refine.shrunk(self.analysis(self.picture), refine.DEAD_ZONE))
+        found = self.analysis(self.picture)
+        shrink(found, DEAD_ZONE)
+        return self.supported(found)
 
-    def supported(self, latents: list[Tensor]) -> list[Tensor]:
+    def supported(self, latents: list[Floats]) -> list[Floats]:
         """Latents with 0 where they must be 0."""
         if self.support is None:
             return latents
         return [y * mask for y, mask in zip(latents, self.support, strict=True)]
 
-    @torch.no_grad()
-    def analysis(self, picture: Tensor) -> list[Tensor]:
-        """Analysis of samples [1, 3, rows, columns], window by window."""
-        shapes = [self.grid.at(level) for level in self._depths()]
-        found = [torch.zeros(1, 9, *shape) for shape in shapes[:-1]]
-        found.append(torch.zeros(1, 3, *shapes[-1]))
-        for box in self.windows(REACH):
-            part = picture[:, :, box.outer[0], box.outer[1]]
-            self._keep(box, found, self.model.analyse(part, self.step, self.count))
+    def analysis(self, picture: Floats) -> list[Floats]:
+        """Analysis of samples float32 [3, rows, columns]."""
+        found: list[Floats] = engine().analysed(
+            self.number, picture, self.step, self.grid, self.threads
+        )
         return found
 
     def _depths(self) -> list[int]:
         """Level of each array of latents; the lowest planes have the size of the last level."""
         return [*range(1, self.count + 1), self.count]
 
-    def windows(self, reach: int = MARGIN) -> list[Window]:
-        """Windows that cover the raster, row by row, and see at least `reach` samples beyond."""
-        unit = 1 << self.count
-        _, _, rows, columns = self.picture.shape
-        side = max(WINDOW // unit, 1) * unit
-        margin = -(-reach // unit) * unit
-        return [
-            Window.of((top, left), side, margin, (rows, columns))
-            for top in range(0, rows, side)
-            for left in range(0, columns, side)
-        ]
+    def windows(self) -> list[Window]:
+        """Windows in which latents are refined, one after the other."""
+        return windows(self.picture.shape[1:], self.count)
 
     def holds(self, box: Window) -> bool:
         """Whether a window sees any cell of the support."""
@@ -210,86 +194,60 @@ class Job:
         rows, columns = (slice(s.start >> CELL, -(-s.stop >> CELL)) for s in box.outer)
         return bool(self.raster.cells[rows, columns].any())
 
-    def refine(
-        self, box: Window, effort: Effort, seed: int, random: torch.Generator,
-        tick: Callable[[int], None],
-    ) -> None:  # fmt: skip
+    def parts(self, effort: Effort) -> Iterator[Effort]:
+        """Yields parts of refinement; between them, shifts are found for latents as they are."""
+        first = 0 if self.raster.structural or effort.rounds < 2 * TRIAL else TRIAL
+        if first:
+            yield effort._replace(rounds=first)
+            self.shifts, self.done = self._shifts(), first
+        yield effort._replace(rounds=effort.rounds - first)
+
+    def refine(self, box: Window, effort: Effort, seed: int, tick: Callable[[int], None]) -> None:
         """Refines the latents of a window; those that earlier windows decided stay."""
         now = self._seen(box, self.latents)
-        target = self._target(box, now)
-        if self.raster.structural:
-            # Moves by one need the curvature of the squared error, so all turns become steps.
-            target = refine.structural(self.model, target, now)
-            effort = Effort(effort.steps + effort.rounds, 0)
+        goal = self._goal(box, now)
+        tools = engine(self.raster.structural)
+        best, raised = tools.improved(
+            goal, now, effort, seed, self.threads, lambda: tick(box.samples)
+        )
+        box.keep(self.latents, best, self._depths())
+        if raised:
+            raise raised
 
-        def done() -> None:
-            tick(box.samples)
-
-        best = now
-        try:
-            if effort.steps:
-                best = refine.refined(self.model, target, now, effort.steps, random, done)
-            if effort.rounds:
-                best = refine.improved(self.model, target, best, effort.rounds, seed, done)
-        finally:
-            self._keep(box, self.latents, best)
-
-    def _target(self, box: Window, now: list[Tensor]) -> Target:
-        """Target of the latents `now` that a window sees."""
+    def _goal(self, box: Window, now: list[Floats]) -> Goal:
+        """Goal of the latents `now` that a window sees."""
         rows, columns = box.outer
         free = None
         if box.partial:
             masks = map(box.mask, self._depths())
-            free = [m.expand(1, y.shape[1], -1, -1) for y, m in zip(now, masks, strict=True)]
+            free = [np.broadcast_to(m, y.shape) for y, m in zip(now, masks, strict=True)]
         support = None if self.support is None else self._seen(box, self.support)
-        weight = None if self.weight is None else self.weight[:, :, rows, columns]
-        picture = self.picture[:, :, rows, columns]
-        return Target(picture, weight, support, free, self.step, self.shifts)
+        weight = self.raster.weight
+        return Goal(
+            self.picture[:, rows, columns], None if weight is None else weight[rows, columns],
+            support, free, self.step, self.shifts, self.number, structural=self.raster.structural,
+            done=self.done,
+        )  # fmt: skip
 
-    def _seen(self, box: Window, arrays: list[Tensor]) -> list[Tensor]:
-        """Parts that a window sees of arrays of levels 1, 2, ..., and maybe of lowest planes."""
+    def _seen(self, box: Window, arrays: Sequence[NDArray[Any]]) -> list[NDArray[Any]]:
+        """Parts that a window sees of arrays of levels 1, 2, ..., and of the lowest planes."""
         places = map(box.at, self._depths())
-        return [y[:, :, i, j] for y, (i, j) in zip(arrays, places, strict=False)]
-
-    def _keep(self, box: Window, arrays: list[Tensor], found: list[Tensor]) -> None:
-        """Copies the inner part of arrays that a window found to the arrays of the raster.
-
-        The margin is left out, because the edges of the window disturb it.
-        """
-        for whole, new, level in zip(arrays, found, self._depths(), strict=True):
-            (i, j), within = box.at(level, inner=True), box.inside(level)
-            whole[:, :, i, j] = new[:, :, within[0], within[1]]
+        return [y[:, i, j] for y, (i, j) in zip(arrays, places, strict=True)]
 
     def planes(self) -> Planes:
         """Codes the present latents, rounded."""
-        found = [torch.round(y) for y in self.latents]
-        whole = [y[0].numpy().astype(np.int32) for y in found]
+        whole = [np.rint(y).astype(np.int32) for y in self.latents]
         r = self.raster
         return coded.encoded(
-            Latents(tuple(whole[:-1]), whole[-1]), r.size, self.step_index, r.cells, CELL,
-            1 if r.grey else 3, NUMBER, self._shifts(),
+            Latents(tuple(whole[:-1]), whole[-1]), r.size, self.step, r.cells, CELL,
+            1 if r.grey else 3, self.number, self._shifts(),
         )  # fmt: skip
 
-    @torch.no_grad()
     def _shifts(self) -> tuple[int, ...]:
         """Shifts of the scale index with which the present latents take the fewest bits."""
-        samples: list[list[Sample]] = [[] for _ in range(2 * self.count)]
-        few = slice(None, None, SPARSE)
+        self.shifts = (0,) * (2 * self.count)
+        total: NDArray[np.float64] = np.zeros((2 * self.count, 16))
         for box in self.windows():
-            own = [torch.round(y) for y in self._seen(box, self.latents)]
-            for k, p in enumerate(self.model.likelihoods(own, self.step)):
-                y, mean, scale = (v[:, :, few, few] for v in (own[k], *p))
-                mask = torch.ones(1, 9, 1, 1)
-                if self.support is not None:
-                    a = box.at(k + 1)
-                    mask = self.support[k][:, :, a[0], a[1]][:, :, few, few]
-                for group, at in enumerate((slice(3), slice(3, 9))):
-                    part = Sample(y[:, at] - mean[:, at], scale[:, at], mask[:, at])
-                    samples[2 * k + group].append(part)
-        return tuple(best_shift(part) for part in samples)
-
-
-def tensor(values: NDArray[np.floating]) -> Tensor:
-    """Tensor float32 [1, C, H, W] of an array [C, H, W], with channels last in memory."""
-    whole = torch.from_numpy(np.ascontiguousarray(values, np.float32))[None]
-    return whole.contiguous(memory_format=torch.channels_last)
+            own = [np.rint(y) for y in self._seen(box, self.latents)]
+            total += engine().bits_by_shift(self._goal(box, own), own, self.threads)
+        return tuple(map(best_shift, total))

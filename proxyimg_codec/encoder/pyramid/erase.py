@@ -11,9 +11,7 @@ from collections.abc import Callable
 
 import cv2
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 from ...texture import planes as coded
 from ...texture.context import SHIFT_ORIGIN
@@ -22,9 +20,8 @@ from ...texture.latents import Latents
 from ...texture.network import Floats
 from ...texture.planes import Planes
 from ..completion.membrane import continued_from
-from .encode import CELL, Effort, Job, Raster, tensor
-from .load import load
-from .refine import Target
+from .encode import CELL, Job, Raster
+from .goal import Effort, Goal
 from .window import Window
 
 NUMBER = 2
@@ -61,10 +58,9 @@ def erased(planes: Planes, kept: NDArray[np.bool_], effort: Effort, seed: int,
     if not gone.any():
         return planes
     job = _Erasure(planes, kept, gone)
-    random = torch.Generator().manual_seed(seed)
     for window in job.windows():
         if job.concerns(window):
-            job.refine(window, effort, seed, random, tick)
+            job.refine(window, effort, seed, tick)
     return job.planes()
 
 
@@ -88,63 +84,67 @@ class _Erasure(Job):
         if old.packed["support"]:
             left = old.support & self.cells
             self.cells = left if left.any() else old.support
-        self.free: list[Tensor] = []
+        self.free: list[NDArray[np.bool_]] = []
         grid = Grid.of(old.packed)
         rows, columns = grid.at(0) if grid.padded else gone.shape
         beyond = (0, rows - gone.shape[0]), (0, columns - gone.shape[1])
         before = np.repeat(old.raster * np.float32(255), 3 // old.components, 2)
         after = _blanked(before, kept)
-        self.before = tensor(np.pad(before, (*beyond, (0, 0)), mode="edge").transpose(2, 0, 1))
+        before = np.pad(before, (*beyond, (0, 0)), mode="edge").transpose(2, 0, 1)
+        self.before = np.ascontiguousarray(before)
         after = np.pad(after, (*beyond, (0, 0)), mode="edge")
         weight = np.pad(np.where(kept, 1, BLANK).astype(np.float32), beyond, mode="edge")
         raster = Raster(after, weight, self.cells, old.components == 1)
-        super().__init__(load(NUMBER), raster, old.packed["step"], grid)
+        super().__init__(NUMBER, raster, old.packed["step"], grid=grid)
 
-    def _support(self) -> list[Tensor]:
+    def _support(self) -> list[Floats]:
         masks = []
         for level in range(1, self.count + 1):
             mask = by_channel(self.grid.bands(self.cells, self.cell, level))
             mask[3:] &= level > self.old.packed["grey"]
-            masks.append(tensor(mask.astype(np.float32)))
+            masks.append(mask.astype(np.float32))
         lowest = np.ones((3, *mask.shape[1:]), np.float32)
         lowest[self.old.components :] = 0
-        return [*masks, tensor(lowest)]
+        return [*masks, lowest]
 
-    def _analysed(self) -> list[Tensor]:
+    def _analysed(self) -> list[Floats]:
         latents = self.old.latents
-        found = [tensor(y.astype(np.float32)) for y in (*latents.levels, latents.lowest)]
+        found = [y.astype(np.float32) for y in (*latents.levels, latents.lowest)]
         over = [self._over(level) for level in self._depths()]
         # No dead zone: what shows beside the erased samples is to change as little as possible.
         after = self.analysis(self.picture)
         new = self.supported(
             [
-                torch.where(mask, torch.round(y), old + torch.round(y - before))
+                np.where(mask, np.rint(y), old + np.rint(y - before))
                 for mask, y, old, before in zip(
                     over, after, found, self.analysis(self.before), strict=True
                 )
             ]
         )
         self.free = [
-            mask | (y != old).any(1, keepdim=True)
+            mask | (y != old).any(0, keepdims=True)
             for mask, y, old in zip(over, new, found, strict=True)
         ]
         return new
 
-    def _over(self, level: int) -> Tensor:
-        """Positions of a level, bool [1, 1, h, w], that lie over samples that go."""
+    def _over(self, level: int) -> NDArray[np.bool_]:
+        """Positions of a level, bool [1, h, w], that lie over samples that go."""
         found = coded.blocks(self.gone, level, self.grid.at(level))
-        return torch.from_numpy(found)[None, None]
+        return found[None]
 
     def concerns(self, box: Window) -> bool:
         """Whether any latents of a window change."""
-        return any(bool(m.any()) for m in self._seen(box, self.free))
+        return any(m.any() for m in self._seen(box, self.free))
 
-    def _target(self, box: Window, now: list[Tensor]) -> Target:
-        target = super()._target(box, now)
-        free = [m.expand(y.shape) for m, y in zip(self._seen(box, self.free), now, strict=True)]
-        if target.free is not None:
-            free = [a & b for a, b in zip(free, target.free, strict=True)]
-        return target._replace(free=free, price=PRICE)
+    def _goal(self, box: Window, now: list[Floats]) -> Goal:
+        goal = super()._goal(box, now)
+        free = [
+            np.broadcast_to(m, y.shape)
+            for m, y in zip(self._seen(box, self.free), now, strict=True)
+        ]
+        if goal.free is not None:
+            free = [a & b for a, b in zip(free, goal.free, strict=True)]
+        return goal._replace(free=free, price=PRICE)
 
     def planes(self) -> Planes:
         """Codes the present latents.
@@ -152,9 +152,9 @@ class _Erasure(Job):
         Changed contexts may take a latent that did not change for certainly 0, though it is not.
         Then the scales of its level are shifted until it is coded again, or no more is allowed.
         """
-        found = [torch.round(y)[0].numpy().astype(np.int32) for y in self.latents]
+        found = [np.rint(y).astype(np.int32) for y in self.latents]
         packed, shifts = self.old.packed, list(self._shifts())
-        fixed = [~m[0].numpy() for m in self.free]
+        fixed = [~m for m in self.free]
         while True:
             made = coded.encoded(
                 Latents(tuple(found[:-1]), found[-1]), self.old.size, packed["step"], self.cells,

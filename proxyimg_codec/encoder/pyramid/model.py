@@ -13,6 +13,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from .convolutions import Convolution, Residual, convolve, eight_bit, through, weight_step
+from .goal import LEVELS
 from .wavelet import (
     Size,
     analysis_weights,
@@ -21,9 +22,6 @@ from .wavelet import (
     reflected,
     synthesis_weights,
 )
-
-LEVELS = 6
-"""Most levels of a pyramid that is encoded."""
 
 SHARED_FROM = 4
 """Levels from this one on share their weights."""

@@ -25,7 +25,8 @@ from ..completion.membrane import continued, continued_from
 from ..settings import Settings
 from ..shapes.coverage import coverage_of
 from ..shapes.layers import Plan, alike
-from .encode import CELL, EFFORTS, Effort, Raster, encode
+from .encode import CELL, EFFORTS, Raster, encode
+from .goal import Effort
 from .matte import Soft, soft_rasters
 
 Report = Callable[[str, int, int], None]
@@ -160,7 +161,7 @@ def _coded(
     interrupts: Interrupts,
 ) -> list[Planes]:  # fmt: skip
     """Encodes all rasters at the step of index `step`; records an interrupt in `interrupts`."""
-    work = sum(r.samples[..., 0].size for r in rasters) * (effort.steps + effort.rounds)
+    work = sum(r.samples[..., 0].size * effort.turns(r.structural) for r in rasters)
     done = 0
 
     def tick(samples: int) -> None:
@@ -171,8 +172,9 @@ def _coded(
     out = []
     for raster in rasters:
         planes, complete = encode(
-            raster, step, Effort(0, 0) if interrupts.seen else effort, settings.seed, tick
-        )
+            raster, step, Effort(0, 0) if interrupts.seen else effort, settings.seed, tick,
+            settings.jobs,
+        )  # fmt: skip
         interrupts.seen |= not complete
         out.append(planes)
     return out
@@ -206,7 +208,7 @@ def _aimed(
         return math.log((8 * size / pixels if kind == "bpp" else size) / wanted)
 
     step, slope = settings.step, -0.0095
-    for trial in (Effort(0, 1), effort):
+    for trial in (Effort(1, 1), effort):
         seen: list[tuple[int, float]] = []
         for _ in range(TRIES):
             image = at(step, trial)

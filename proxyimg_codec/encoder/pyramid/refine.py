@@ -8,20 +8,12 @@ from typing import NamedTuple
 
 import torch
 from torch import Tensor
+from torch.nn import functional as F
 
+from .goal import FIRST_SHARE, HESITATION, LEAST_GAIN, RAMP, RATE_WEIGHT, SURE
 from .model import Likelihood, Model
 from .rate import around, bits, bits_of_integers
 from .similarity import ms_ssim
-
-RATE_WEIGHT = 0.15
-"""Squared error, in squares of the quantization step, that a bit is worth.
-
-High-rate theory gives 2 ln 2 / 12 = 0.116 for uniform quantization. Here latents are chosen by
-their cost, so a finer step with dearer bits is better.
-"""
-
-DEAD_ZONE = 0.2
-"""Distance by which latents of the analysis are moved towards zero before refinement."""
 
 RATE, BETAS = 0.08, (0.8, 0.95)
 """Learning rate and averages of Adam for latents: large and short, because there are few steps."""
@@ -55,10 +47,6 @@ class Target(NamedTuple):
     price: float = RATE_WEIGHT
 
 
-MOVING = 0.35
-"""Share of the latents that gain by a move, which make it in a round."""
-
-
 def annealed(share: float) -> float:
     """Factor of the learning rate when a share 0..1 of the steps is done."""
     return 0.475 * (1 + math.cos(math.pi * share)) + 0.05
@@ -67,11 +55,6 @@ def annealed(share: float) -> float:
 def temperature(share: float) -> float:
     """Temperature of stochastic rounding when a share 0..1 of the steps is done."""
     return float(0.5 * 0.3**share)
-
-
-def shrunk(latents: Sequence[Tensor], by: float) -> list[Tensor]:
-    """Moves latents towards zero by at most `by`; the lowest planes, which are last, stay."""
-    return [y - y.clamp(-by, by) for y in latents[:-1]] + [latents[-1]]
 
 
 def relaxed(latents: Sequence[Tensor], temperature: float, random: torch.Generator) -> list[Tensor]:
@@ -202,8 +185,8 @@ def held(latents: Sequence[Tensor], fixed: Sequence[Tensor], target: Target) -> 
 
 
 def improved(
-    model: Model, target: Target, latents: Sequence[Tensor], rounds: int, seed: int,
-    tick: Callable[[], None],
+    model: Model, target: Target, latents: Sequence[Tensor], rounds: int, tick: Callable[[], None],
+    done: int = 0,
 ) -> list[Tensor]:  # fmt: skip
     """Rounds latents, and moves them by one where that lowers the cost, round after round.
 
@@ -212,17 +195,18 @@ def improved(
         target: Target of the latents.
         latents: Latents of levels 1, 2, ..., then the lowest planes.
         rounds: Number of rounds.
-        seed: Seed of the choice of moves.
         tick: Called after each round.
+        done: Rounds that were made before.
 
     Returns:
         Integer latents: the best of all rounds.
     """
-    random = torch.Generator().manual_seed(seed)
     now = held([torch.round(y) for y in latents], [torch.round(y) for y in latents], target)
-    first = best = now
-    least = math.inf
+    best, least = now, math.inf
+    last = [torch.zeros_like(y) for y in now]
     for turn in range(rounds + 1):
+        if 0 < turn == rounds and done + turn < SURE:
+            return now
         ys = [y.clone().requires_grad_(True) for y in now]
         with torch.set_grad_enabled(turn < rounds):
             spent = cost(model, target, ys, smooth=False)
@@ -232,49 +216,64 @@ def improved(
         if turn == rounds:
             break
         slopes = torch.autograd.grad(total, ys)
-        # The analysis rounds the lowest planes one by one, which a smooth border may show.
-        found = moved(
-            model, target.step, now, spent.likely, slopes, random, turn == 0, target.price
-        )
-        now = held(found, first, target)
+        changes = moves(model, target, now, spent.likely, slopes, done + turn, last)
+        last = [torch.where(c != 0, c, v) for c, v in zip(changes, last, strict=True)]
+        now = [y + c for y, c in zip(now, changes, strict=True)]
         tick()
     return best
 
 
 @torch.no_grad()
-def moved(
-    model: Model, step: Tensor, latents: Sequence[Tensor], likely: Sequence[Likelihood],
-    slopes: Sequence[Tensor], random: torch.Generator, settle: bool, price: float = RATE_WEIGHT,
+def moves(
+    model: Model, target: Target, latents: Sequence[Tensor], likely: Sequence[Likelihood],
+    slopes: Sequence[Tensor], turn: int, last: Sequence[Tensor],
 ) -> list[Tensor]:  # fmt: skip
-    """Makes one round of moves of integer latents by one.
+    """Finds the moves of integer latents in a round.
 
     The change of a latent's own bits is exact. That of the error and of the bits of others is
     estimated from the slope of the cost and the curvature of the error. Neighbours that move
-    together may overshoot, so only a random part of the latents that would gain moves.
+    together may overshoot, so a move has to gain nearly as much as the best of 3 x 3 positions.
 
     Args:
         model: The model.
-        step: [B] quantization steps.
+        target: Target of the latents.
         latents: Integer latents of levels 1, 2, ..., then the lowest planes.
         likely: Distributions of the latents.
         slopes: Derivatives of the total cost by the latents.
-        random: Generator that chooses the latents that move.
-        settle: Whether the lowest planes move too, whose values all count as equally cheap.
-        price: Error that a bit is worth, in squares of the step.
+        turn: Number of the round, from 0.
+        last: Last move of each latent.
+
+    Returns:
+        Changes of the latents: -1, 0 or 1.
     """
-    out = list(latents)
+    price, out = target.price, []
+    share = FIRST_SHARE + (1 - FIRST_SHARE) * min(turn / RAMP, 1)
     for k, p in enumerate(likely):
-        y = latents[k]
-        own = around(y, *p)
+        own = around(latents[k], *p)
         outer = slopes[k] - price * own.slope
-        bend = model.level(k + 1).gains_at(step) ** 2
+        bend = model.level(k + 1).gains_at(target.step) ** 2
         down = bend - outer + price * (own.below - own.here)
         up = bend + outer + price * (own.above - own.here)
         change = torch.where(up < down, 1.0, -1.0)
-        gains = torch.minimum(up, down) < -1e-3
-        out[k] = y + change * (gains & (torch.rand(y.shape, generator=random) < MOVING))
-    if settle:
-        lowest, slope = latents[-1], slopes[-1]
-        some = torch.rand(lowest.shape, generator=random) < MOVING
-        out[-1] = lowest - torch.sign(slope) * ((slope.abs() > 1 + 1e-3) & some)
-    return out
+        gain = -torch.minimum(up, down)
+        good = (gain > LEAST_GAIN) & ~((last[k] == -change) & (gain < HESITATION))
+        gain = gain * good * _allowed(target, k, gain)
+        best = F.max_pool2d(gain.amax(1, keepdim=True), 3, 1, 1)
+        out.append(change * ((gain > 0) & (gain >= share * best)))
+    change = torch.zeros_like(latents[-1])
+    if turn == 0:
+        # The analysis rounds the lowest planes one by one, which a smooth border may show. All
+        # their values count as equally cheap; of those beside each other one moves.
+        rows, columns = (torch.arange(n) for n in change.shape[2:])
+        some = (rows[:, None] + columns) % 2 == 0
+        change = -torch.sign(slopes[-1]) * ((slopes[-1].abs() > 1 + LEAST_GAIN) & some)
+        change = change * _allowed(target, len(likely), change)
+    return [*out, change]
+
+
+def _allowed(target: Target, k: int, like: Tensor) -> Tensor:
+    """Mask, 1 for the latents of array `k` that may move."""
+    out = torch.ones_like(like)
+    if target.free is not None:
+        out = out * target.free[k]
+    return out if target.support is None else out * target.support[k]

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
-import torch
-from torch import Tensor
+import numpy as np
+from numpy.typing import NDArray
+
+from ...texture.network import Floats
+
+WINDOW, MARGIN = 768, 64
+"""Side of a window in samples, and margin that it sees beyond that; refinement in windows bounds
+memory."""
 
 
 class Window(NamedTuple):
@@ -61,19 +68,50 @@ class Window(NamedTuple):
         )
         return rows, columns
 
-    def mask(self, level: int) -> Tensor:
+    def mask(self, level: int) -> NDArray[np.bool_]:
         """Mask of the latents of a level that may change: those that no earlier window decided.
 
         Windows above, and windows to the left in the same rows, are earlier.
 
         Returns:
-            bool [1, 1, h, w] of the latents that the window sees.
+            bool [1, h, w] of the latents that the window sees.
         """
         rows, columns = self.at(level)
         i, j = self.inside(level)
-        out = torch.zeros(
-            (1, 1, rows.stop - rows.start, columns.stop - columns.start), dtype=torch.bool
-        )
-        out[:, :, i, j.start :] = True
-        out[:, :, i.stop :] = True
+        out = np.zeros((1, rows.stop - rows.start, columns.stop - columns.start), bool)
+        out[:, i, j.start :] = True
+        out[:, i.stop :] = True
         return out
+
+    def keep(self, arrays: list[Floats], found: Sequence[Floats], depths: Sequence[int]) -> None:
+        """Copies the inner part of arrays that the window found to the arrays of the raster.
+
+        The margin is left out, because the edges of the window disturb it.
+
+        Args:
+            arrays: Arrays [C, h, w] of the raster.
+            found: Those of the window.
+            depths: Level of each array.
+        """
+        for whole, new, level in zip(arrays, found, depths, strict=True):
+            (i, j), within = self.at(level, inner=True), self.inside(level)
+            whole[:, i, j] = new[:, within[0], within[1]]
+
+
+def windows(shape: tuple[int, ...], levels: int, reach: int = MARGIN) -> list[Window]:
+    """Windows that cover a raster, row by row, and see at least `reach` samples beyond.
+
+    Args:
+        shape: Rows and columns of the raster.
+        levels: Number of levels, whose positions windows do not divide.
+        reach: Least number of samples.
+    """
+    unit = 1 << levels
+    rows, columns = shape
+    side = max(WINDOW // unit, 1) * unit
+    margin = -(-reach // unit) * unit
+    return [
+        Window.of((top, left), side, margin, (rows, columns))
+        for top in range(0, rows, side)
+        for left in range(0, columns, side)
+    ]

@@ -9,7 +9,14 @@ import torch
 
 from proxyimg_codec import encode, from_bytes
 from proxyimg_codec.encoder.pyramid import encode as pyramid
-from proxyimg_codec.encoder.pyramid import rate, refine
+from proxyimg_codec.encoder.pyramid import (
+    engine_native,
+    engine_torch,
+    goal,
+    rate,
+    refine,
+    window,
+)
 from proxyimg_codec.encoder.pyramid.encode import Effort, Raster
 from proxyimg_codec.encoder.pyramid.load import load
 from proxyimg_codec.encoder.pyramid.shifts import SHIFTS
@@ -114,29 +121,36 @@ def test_refinement_lowers_the_cost():
     step = torch.tensor([2.0 ** (300 / 64)])
     target = refine.Target(x, None, None, None, step)
     with torch.no_grad():
-        start = refine.shrunk(net.analyse(x, step, 4), refine.DEAD_ZONE)
+        start = net.analyse(x, step, 4)
 
     def costs(latents):
         with torch.no_grad():
             return float(refine.cost(net, target, [torch.round(y) for y in latents], False).total)
 
     random = torch.Generator().manual_seed(0)
-    greedy = refine.improved(net, target, start, 6, 0, lambda: None)
+    greedy = refine.improved(net, target, start, 6, lambda: None)
     annealed = refine.refined(net, target, start, 12, random, lambda: None)
-    both = refine.improved(net, target, annealed, 6, 0, lambda: None)
+    both = refine.improved(net, target, annealed, 6, lambda: None)
     assert costs(greedy) < 0.97 * costs(start)
     assert costs(both) < costs(annealed)
     assert all((y == torch.round(y)).all() for y in greedy)
 
 
-def test_shifts_take_the_fewest_bits():
-    job = pyramid.Job(load(1), Raster(textured(96, 96, 3).astype(np.float32)), 256)
+ENGINES = {"native": engine_native, "torch": engine_torch}
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_shifts_take_the_fewest_bits(monkeypatch, engine):
+    monkeypatch.setattr(pyramid, "engine", lambda structural=False: ENGINES[engine])
+    job = pyramid.Job(2, Raster(textured(96, 96, 3).astype(np.float32)), 256)
     best = job._shifts()
-    likely = job.model.likelihoods([torch.round(y) for y in job.latents], job.step)
-    few = slice(None, None, pyramid.SPARSE)
-    for k, (y, p) in enumerate(zip(job.latents, likely, strict=False)):
+    latents = [torch.round(torch.from_numpy(y))[None] for y in job.latents]
+    likely = load(2).likelihoods(latents, torch.tensor([2.0 ** (256 / 64)]))
+    few = slice(None, None, engine_torch.SPARSE)
+    for k, (y, p) in enumerate(zip(latents, likely, strict=False)):
         for group, at in enumerate((slice(3), slice(3, 9))):
-            y_, mean, scale = (v[:, at, few, few] for v in (torch.round(y), *p))
+            across = few if engine == "torch" else slice(None)
+            y_, mean, scale = (v[:, at, few, across] for v in (y, *p))
             spent = {
                 s: rate.bits_of_integers(y_, mean, (scale + s / 8).clamp(-4, 3.875)).sum().item()
                 for s in SHIFTS
@@ -162,12 +176,12 @@ def test_windows_change_little(monkeypatch):
     picture = textured(128, 96)
     raster = Raster(picture.astype(np.float32))
     whole, _ = pyramid.encode(raster, 300, Effort(0, 4), 0, lambda n: None)
-    monkeypatch.setattr(pyramid, "WINDOW", 64)
+    monkeypatch.setattr(window, "WINDOW", 64)
     tiled, _ = pyramid.encode(raster, 300, Effort(0, 4), 0, lambda n: None)
     costs = []
     for planes in (whole, tiled):
         error = ((255 * planes.raster - picture) ** 2).sum() / 2 ** (300 / 32)
-        costs.append(error + refine.RATE_WEIGHT * 8 * len(planes.packed["data"]))
+        costs.append(error + goal.RATE_WEIGHT * 8 * len(planes.packed["data"]))
     # Windows of 64 samples have edges everywhere; real ones are 768.
     assert costs[1] == pytest.approx(costs[0], rel=0.1)
 

@@ -6,6 +6,7 @@ import pytest
 
 import proxyimg_codec as pxi
 from proxyimg_codec.encoder.pyramid import encode as pyramid
+from proxyimg_codec.encoder.pyramid import window
 from proxyimg_codec.encoder.pyramid.encode import Effort, Raster
 from proxyimg_codec.encoder.pyramid.erase import erased
 from proxyimg_codec.texture.latents import Latents
@@ -74,10 +75,11 @@ def test_far_latents_stay_and_samples_nearly(planes):
         reach = 4 << level  # of the filters of the analysis of this level and all finer ones
         near = cv2.dilate((~KEPT).astype(np.uint8), np.ones((2 * reach + 1, 2 * reach + 1))) > 0
         away = ~over(near, a, level)
-        np.testing.assert_array_equal(a[:, away], b[:, away])
+        # But for one that its changed context takes for certainly 0, see `_Erasure.planes`.
+        assert np.abs(a - b)[:, away].sum() <= 1
     change = np.abs(after.raster - before.raster).max(-1) * 255
     distance = cv2.distanceTransform(KEPT.astype(np.uint8), cv2.DIST_L2, 5)
-    for least, most in ((1, 24), (3, 14), (9, 5), (25, 2)):
+    for least, most in ((1, 24), (3, 14), (9, 7), (25, 2)):
         assert change[distance >= least].max() < most
     assert np.sqrt((change[KEPT] ** 2).mean()) < 1.5
 
@@ -100,7 +102,7 @@ def test_the_same_again_and_what_is_nothing(planes):
 
 def test_grey_planes_and_windows(monkeypatch):
     """Small windows see only parts of what goes."""
-    monkeypatch.setattr(pyramid, "WINDOW", 64)
+    monkeypatch.setattr(window, "WINDOW", 64)
     samples = np.repeat(hidden.pixels("red")[..., :1], 3, 2).astype(np.float32)
     before, _ = pyramid.encode(Raster(samples, grey=True), 250, QUICK, 0, lambda n: None)
     after = erased(before, KEPT, QUICK, 0)
