@@ -117,8 +117,8 @@ class Job:
 
     Attributes:
         picture: float32 [3, rows, columns] samples.
-        support: For each level, then for the lowest planes, a float32 mask [channels, h, w], 0 for
-            latents that must be 0; None = all 1.
+        support: For each level, then for the lowest planes, a mask bool [channels, h, w], False for
+            latents that must be 0; None = all True.
         latents: Latents of levels 1, 2, ..., then the lowest planes, float32 [channels, h, w].
         shifts: Shifts of the scale index.
         grid: Sizes of the planes.
@@ -139,13 +139,13 @@ class Job:
         self.number, self.raster, self.step, self.threads = number, raster, step, threads
         self.grid = grid or Grid(raster.size, levels_for(raster.size))
         self.count = self.grid.levels
-        self.picture = np.ascontiguousarray(raster.samples.transpose(2, 0, 1), np.float32)
+        self.picture = np.asarray(raster.samples, np.float32).transpose(2, 0, 1)
         self.support = self._support()
         self.latents = self._analysed()
         self.done = 0
         self.shifts: tuple[int, ...] = self._shifts()
 
-    def _support(self) -> list[Floats] | None:
+    def _support(self) -> list[NDArray[np.bool_]] | None:
         r = self.raster
         unit = 1 << self.count
         if r.cells is None and not r.grey and r.size[0] % unit == r.size[1] % unit == 0:
@@ -155,9 +155,9 @@ class Job:
         for level in range(1, self.count + 1):
             mask = by_channel(self.grid.bands(cells, CELL, level))
             mask[3:] &= not r.grey
-            masks.append(mask.astype(np.float32))
-        lowest = np.ones((3, *mask.shape[1:]), np.float32)
-        lowest[1:] *= not r.grey
+            masks.append(mask)
+        lowest = np.ones((3, *mask.shape[1:]), np.bool_)
+        lowest[1:] = not r.grey
         return [*masks, lowest]
 
     def _analysed(self) -> list[Floats]:
@@ -167,10 +167,12 @@ class Job:
         return self.supported(found)
 
     def supported(self, latents: list[Floats]) -> list[Floats]:
-        """Latents with 0 where they must be 0."""
+        """Sets latents to 0 in place where they must be 0, and returns them."""
         if self.support is None:
             return latents
-        return [y * mask for y, mask in zip(latents, self.support, strict=True)]
+        for y, mask in zip(latents, self.support, strict=True):
+            y *= mask
+        return latents
 
     def analysis(self, picture: Floats) -> list[Floats]:
         """Analysis of samples float32 [3, rows, columns]."""
@@ -221,7 +223,9 @@ class Job:
         if box.partial:
             masks = map(box.mask, self._depths())
             free = [np.broadcast_to(m, y.shape) for y, m in zip(now, masks, strict=True)]
-        support = None if self.support is None else self._seen(box, self.support)
+        support = None
+        if self.support is not None:
+            support = [mask.astype(np.float32) for mask in self._seen(box, self.support)]
         weight = self.raster.weight
         return Goal(
             self.picture[:, rows, columns], None if weight is None else weight[rows, columns],
@@ -235,12 +239,13 @@ class Job:
         return [y[:, i, j] for y, (i, j) in zip(arrays, places, strict=True)]
 
     def planes(self) -> Planes:
-        """Codes the present latents, rounded."""
-        whole = [np.rint(y).astype(np.int32) for y in self.latents]
-        r = self.raster
+        """Codes the present latents, rounded; they are gone then, to make room."""
+        shifts, r, whole = self._shifts(), self.raster, list[NDArray[np.int32]]()
+        while self.latents:
+            whole.insert(0, np.rint(self.latents.pop()).astype(np.int32))
         return coded.encoded(
             Latents(tuple(whole[:-1]), whole[-1]), r.size, self.step, r.cells, CELL,
-            1 if r.grey else 3, self.number, self._shifts(),
+            1 if r.grey else 3, self.number, shifts,
         )  # fmt: skip
 
     def _shifts(self) -> tuple[int, ...]:

@@ -41,6 +41,9 @@ SYNTHESIS = (
 
 ANALYSIS = SYNTHESIS[:-1]
 
+STRIP = 256
+"""Rows whose colours are converted at once, which bounds memory."""
+
 
 class _Weights(ct.Structure):
     """Mirrors `struct RefinedWeights`."""
@@ -193,7 +196,10 @@ def analysed(number: int, picture: Floats, step: int, grid: Grid, threads: int) 
     """
     sets = analysis_weights(number, step)
     matrix = sets[0]["to_planes"] / np.float32(2.0 ** (step / 64))
-    low = np.tensordot(matrix, picture, 1)
+    low = np.empty((3, *picture.shape[1:]), np.float32)
+    for row in range(0, len(low[0]), STRIP):
+        rows = slice(row, row + STRIP)
+        low[:, rows] = np.tensordot(matrix, picture[:, rows], 1)
     low -= 128 * matrix.sum(1)[:, None, None]
     found = []
     for level in range(1, grid.levels + 1):

@@ -97,14 +97,14 @@ class _Erasure(Job):
         raster = Raster(after, weight, self.cells, old.components == 1)
         super().__init__(NUMBER, raster, old.packed["step"], grid=grid)
 
-    def _support(self) -> list[Floats]:
+    def _support(self) -> list[NDArray[np.bool_]]:
         masks = []
         for level in range(1, self.count + 1):
             mask = by_channel(self.grid.bands(self.cells, self.cell, level))
             mask[3:] &= level > self.old.packed["grey"]
-            masks.append(mask.astype(np.float32))
-        lowest = np.ones((3, *mask.shape[1:]), np.float32)
-        lowest[self.old.components :] = 0
+            masks.append(mask)
+        lowest = np.ones((3, *mask.shape[1:]), np.bool_)
+        lowest[self.old.components :] = False
         return [*masks, lowest]
 
     def _analysed(self) -> list[Floats]:
