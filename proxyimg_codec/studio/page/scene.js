@@ -23,6 +23,8 @@ const meshes = new Map();
 const pending = new Map();
 /** @type {Map<string, number[][][]|null>} */
 const outlines = new Map();
+/** The outline that was last there for a layer: pointed at until a new one has come. @type {Map<string, number[][][]|null>} */
+const recent = new Map();
 /** @type {any} */
 let painter = null;
 
@@ -173,7 +175,7 @@ export function hit(x, y) {
   const [w, h] = store.state.size;
   for (const layer of [...store.state.layers].reverse()) {
     if (layer.hidden || store.locked.has(layer.name)) continue;
-    const paths = outline(layer.name);
+    const now = outline(layer.name), paths = now === undefined ? recent.get(layer.name) : now;
     if (!paths) {
       if (paths === null && x >= 0 && y >= 0 && x <= w && y <= h) return layer.name;
       continue;
@@ -194,6 +196,7 @@ export async function outlineOf(name) {
     const sent = await once(`outline ${key}`, () => get(`/api/layers/${layer.index}/outline`));
     if (outlines.size > 200) outlines.clear();
     outlines.set(key, sent.paths);
+    recent.set(name, sent.paths);
   }
   return outlines.get(key) ?? null;
 }

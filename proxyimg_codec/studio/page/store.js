@@ -59,6 +59,8 @@ export function use(tool) {
 /** @param {any} state */
 export function arrived(state) {
   if (state.version < store.state.version && state.stage !== "empty") return;
+  // Each state comes twice, as an answer and as an event.
+  if (state.version === store.state.version && state.stage === store.state.stage) return;
   const before = store.state;
   store.state = state;
   const known = new Set([...(state.layers ?? []), ...(state.groups ?? []), ...(state.regions ?? [])].map((v) => v.name));

@@ -133,9 +133,10 @@ function build() {
   const parts = state.stage === "pointing" ? pointing()
     : tool === "pins" ? [pinned()] : tool === "points" ? [points()]
     : store.selected.size && frameOf() ? [place(), colour(), structure()] : state.stage === "editing" ? [picture()] : [];
-  const active = /** @type {any} */ (document.activeElement), focused = root.contains(active) ? active.title || active.id : null;
+  const name = (/** @type {any} */ e) => e?.labels?.[0]?.textContent ?? null;
+  const focused = root.contains(document.activeElement) ? name(document.activeElement) : null;
   root.replaceChildren(...parts.filter(Boolean));
-  if (focused) [...root.querySelectorAll("input, select")].find((e) => /** @type {any} */ (e).title === focused)?.focus();
+  if (focused) /** @type {any} */ ([...root.querySelectorAll("input, select")].find((e) => name(e) === focused))?.focus();
 }
 
 on("state selection tool pins framed", build);
