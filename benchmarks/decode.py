@@ -14,7 +14,6 @@ import io
 import statistics
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -23,14 +22,12 @@ from unittest import mock
 import numpy as np
 
 import proxyimg_codec as pxi
-from proxyimg_codec.api import Image
 from proxyimg_codec.codec.write import to_bytes
+from proxyimg_codec.encoder.pyramid.tiles import with_tiles
+from proxyimg_codec.encoder.settings import Settings
 from proxyimg_codec.io.psnr import psnr_8bit
-from proxyimg_codec.model import Layers
 from proxyimg_codec.native import kernel
 from proxyimg_codec.render import thumbnail
-from proxyimg_codec.texture import planes
-from proxyimg_codec.texture.pyramid import PyramidTexture
 
 from .common import Pixels, header, read_rgb, run_limited
 
@@ -59,24 +56,6 @@ def mosaic(folder: Path) -> Pixels:
     """Picture of 4000x3000 pixels from six of a folder."""
     parts = [read_rgb(path)[60:1060, :2000] for path in sorted(folder.glob("*.webp"))[:6]]
     return np.vstack([np.hstack(parts[k : k + 2]) for k in (0, 2, 4)]).astype(np.uint8)
-
-
-def tiled(image: Image, tile: int) -> bytes:
-    """File of a picture whose planes have restart points."""
-    picture = image.picture
-    new = {}
-    for source in picture.planes:
-        p = source.packed
-        shifts = tuple(v - 8 for v in p["shifts"])
-        new[source] = planes.encoded(
-            source.latents, source.size, p["step"], source.support, p["cell"], source.components,
-            p["model"], shifts, tile,
-        )  # fmt: skip
-    views = ((v, v.texture) for v in picture.layers)
-    layers = [
-        replace(v, texture=t.renewed(new) if isinstance(t, PyramidTexture) else t) for v, t in views
-    ]
-    return to_bytes(replace(picture, layers=Layers(layers), planes=tuple(new.values())))
 
 
 def cost(work: Callable[[], Any], times: int) -> float:
@@ -185,7 +164,8 @@ def main(argv: Sequence[str] | None = None) -> None:
         image = pxi.open(path)
         rows = measured(path.read_bytes(), path, side, args.times)
         parts = path.with_stem(f"{name} in tiles")
-        rows += measured(tiled(image, 7), parts, side, args.times)
+        tiled = with_tiles(image.picture, Settings(tiles="always"))
+        rows += measured(to_bytes(tiled), parts, side, args.times)
         for other in PEERS:
             rows += peer(other, pixels, path.stat().st_size, side, args.times)
         print(f"\n{name}, {pixels.shape[1]}x{pixels.shape[0]}")

@@ -1,4 +1,4 @@
-"""Quality of decoded pictures (PSNR, MS-SSIM), and comparison of rate-distortion curves (BD-rate).
+"""Quality of decoded pictures, and comparison of rate-distortion curves (BD-rate).
 
 Pictures are uint8 [H, W, 3] RGB, or [H, W, 4] RGB with straight alpha. A picture with alpha is
 judged over black and over white, and the two results are averaged. So errors of alpha count, and
@@ -7,6 +7,7 @@ the colour of invisible pixels does not.
 
 from __future__ import annotations
 
+import io
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -65,6 +66,29 @@ def ms_ssim(a: Pixels, b: Pixels) -> float:
     """
     values = [_ms_ssim(x, y) for x, y in _seen(a, b)]
     return sum(values) / len(values)
+
+
+def ssimulacra2(a: Pixels, b: Pixels) -> float:
+    """SSIMULACRA 2 of two pictures of the same size, by the package of that name.
+
+    It was fitted to what people say of compressed photographs: 90 cannot be told from the original
+    side by side, 70 is good, 50 is poor.
+
+    Returns:
+        The score, at most 100; NaN if a side is below 8 pixels.
+    """
+    from PIL import Image
+    from ssimulacra2 import compute_ssimulacra2
+
+    if min(a.shape[:2]) < 8:
+        return math.nan
+    scores = []
+    for pair in _seen(a, b):
+        files = io.BytesIO(), io.BytesIO()
+        for pixels, file in zip(pair, files, strict=True):
+            Image.fromarray(np.rint(pixels).astype(np.uint8)).save(file, "BMP")
+        scores.append(float(compute_ssimulacra2(*files)))
+    return sum(scores) / len(scores)
 
 
 def decibel(index: float) -> float:

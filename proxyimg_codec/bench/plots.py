@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 COLOURS = {
     "jpeg": "#b07aa1", "webp": "#59a14f", "jp2": "#9c755f", "jxl": "#e0a020",
     "avif420": "#76a9d8", "avif444": "#2b6cb0", "avif420-s0": "#17365c",
+    "svt": "#3aa6a0",
     "pxi": "#d62728", "pxi-fast": "#f08a7c", "pxi-masks": "#8c1515", "pxi-implicit": "#ff9f40",
 }  # fmt: skip
 """Colours of the curves: warm reds for our codec, a quiet colour for each of the others."""
@@ -27,7 +28,8 @@ STYLE: Any = {
 }  # fmt: skip
 """Style of all plots; the fixed salt makes the same plot give the same SVG file."""
 
-AXES = {"PSNR": "RGB PSNR (dB)", "MS-SSIM": "MS-SSIM (dB, −10 log₁₀(1 − MS-SSIM))"}
+AXES = {"PSNR": "RGB PSNR (dB)", "MS-SSIM": "MS-SSIM (dB, −10 log₁₀(1 − MS-SSIM))",
+        "SSIMULACRA 2": "SSIMULACRA 2"}  # fmt: skip
 
 
 def draw(

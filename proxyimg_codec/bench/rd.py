@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 import platform
 import time
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from ..errors import InputError, PxiError, UsageError
 from ..io import raster
 from . import workers
-from .peers import Codec
+from .peers import EFFORT, EQUAL_TIME, Codec, codecs
 from .rows import Row
 
 Pixels = NDArray[np.uint8]
@@ -49,12 +50,16 @@ class Source:
 
 @dataclass(frozen=True)
 class Task:
-    """One measurement to make: a picture, encoded and decoded by a codec at a quality."""
+    """One measurement to make: a picture, encoded and decoded by a codec at a quality.
+
+    With `perceptual`, SSIMULACRA 2 is measured as well.
+    """
 
     source: Source
     codec: Codec
     version: str
     quality: float
+    perceptual: bool = False
 
 
 @dataclass(frozen=True)
@@ -140,11 +145,13 @@ def load(path: Path) -> Pixels:
     return np.ascontiguousarray(pixels, np.uint8)
 
 
-def plan(sources: Sequence[Source], codecs: Iterable[Codec]) -> list[Task]:
+def plan(
+    sources: Sequence[Source], codecs: Iterable[Codec], perceptual: bool = False
+) -> list[Task]:
     """Lists all tasks, without those where a codec lacks alpha, or a picture the masks it needs."""
     table = [(codec, codec.version()) for codec in codecs]
     return [
-        Task(source, codec, version, quality)
+        Task(source, codec, version, quality, perceptual)
         for source in sources
         for codec, version in table
         if (codec.alpha or not source.alpha) and (source.masks is not None or not codec.masks)
@@ -175,7 +182,7 @@ def _line(error: Exception) -> str:
 
 
 def _measure(source: Source, codec: Codec, task: Task) -> Row:
-    from .measure import ms_ssim, psnr
+    from .measure import ms_ssim, psnr, ssimulacra2
 
     pixels = _pixels(source.path)
     encode = codec.encode
@@ -196,8 +203,32 @@ def _measure(source: Source, codec: Codec, task: Task) -> Row:
         codec.name, codec.settings, task.version, machine(), task.quality,
         len(data), round(8 * len(data) / (source.width * source.height), 6),
         round(psnr(pixels, decoded), 5), round(ms_ssim(pixels, decoded), 7),
+        round(ssimulacra2(pixels, decoded), 4) if task.perceptual else None,
         round(middle - start, 5), round(end - middle, 5),
     )  # fmt: skip
+
+
+def as_slow(source: Source, effort: int | None) -> Codec:
+    """Entry of AVIF 4:4:4 whose CPU time on a picture is nearest to that of our own codec."""
+    table = codecs(EFFORT if effort is None else effort)
+
+    def seconds(name: str) -> float:
+        codec = table[name]
+        quality = codec.qualities[len(codec.qualities) // 2]
+        _warm(codec)
+        start = time.process_time()
+        codec.encode(_pixels(source.path), quality)
+        return max(time.process_time() - start, 1e-3)
+
+    aim = seconds("pxi")
+    names = ["avif444", *(f"avif444-s{n}" for n in reversed(EQUAL_TIME))]
+    best, least = names[0], math.inf
+    for name in names:  # slower and slower
+        apart = abs(math.log(seconds(name) / aim))
+        if apart > least:
+            break
+        best, least = name, apart
+    return table[best]
 
 
 _pixels = lru_cache(maxsize=1)(load)

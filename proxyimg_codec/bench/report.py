@@ -60,7 +60,8 @@ class Log:
     """
 
     def __init__(self, path: Path, tasks: Sequence[Task], old: Sequence[Row]) -> None:
-        known = {row.key: row for row in old}
+        perceptual = any(task.perceptual for task in tasks)
+        known = {row.key: row for row in old if row.perceptual or not perceptual}
         self.path, self._total, self._given = path, len(tasks), len(old)
         self.failures: list[Failure] = []
         self.rows = [
@@ -144,7 +145,7 @@ def write(
     # Small pictures need more bits per pixel; then the plot is wider, to show most of the curves.
     ends = [curve[-1][0] for curve in curves if curve]
     usual = statistics.median(ends) if ends else 0.0
-    for metric, name in (("PSNR", "psnr"), ("MS-SSIM", "msssim")):
+    for metric, name in summary.measured(results).items():
         paths = [out / f"{name}{suffix}" for suffix in (".png", ".svg")]
         draw(results, metric, title, max(1.25 * rates[1], usual), paths)
     return text

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
@@ -31,6 +31,7 @@ class Row:
         bpp: Size in bits per pixel.
         psnr: PSNR in dB; see `measure.psnr`.
         ms_ssim: MS-SSIM, 0..1; see `measure.ms_ssim`.
+        ssimulacra2: SSIMULACRA 2; see `measure.ssimulacra2`. None where it was not asked for.
         encode_s: CPU seconds of encoding, all threads together.
         decode_s: CPU seconds of decoding.
     """
@@ -48,6 +49,7 @@ class Row:
     bpp: float
     psnr: float
     ms_ssim: float
+    ssimulacra2: float | None
     encode_s: float
     decode_s: float
 
@@ -56,9 +58,19 @@ class Row:
         """Key that is equal for measurements of the same picture, codec, version and quality."""
         return self.digest, self.codec, self.settings, self.version, self.quality
 
+    @property
+    def perceptual(self) -> bool:
+        """Whether SSIMULACRA 2 was measured."""
+        return self.ssimulacra2 is not None
+
 
 HEAD = [field.name for field in fields(Row)]
-_TYPES = {"int": int, "float": float, "str": str}
+_TYPES: dict[str, Callable[[str], Any]] = {
+    "int": int,
+    "float": float,
+    "str": str,
+    "float | None": lambda text: float(text) if text else None,
+}
 
 
 def to_csv(rows: Iterable[Row], head: bool = True) -> str:

@@ -26,10 +26,13 @@ ANCHORS = ("jpeg", "webp", "avif420", "avif444", "avif420-s0")
 METRICS: dict[str, Callable[[Row], float]] = {
     "PSNR": lambda row: row.psnr,
     "MS-SSIM": lambda row: row.ms_ssim,
+    "SSIMULACRA 2": lambda row: math.nan if row.ssimulacra2 is None else row.ssimulacra2,
 }
 
-TO_DB: dict[str, Callable[[float], float]] = {"PSNR": lambda value: value, "MS-SSIM": decibel}
-"""Conversion of each metric to dB. MS-SSIM is averaged as it is, but interpolated in dB."""
+TO_DB: dict[str, Callable[[float], float]] = {
+    "PSNR": lambda value: value, "MS-SSIM": decibel, "SSIMULACRA 2": lambda value: value,
+}  # fmt: skip
+"""Scale of each metric: dB where it has one. MS-SSIM is averaged as it is, interpolated in dB."""
 
 
 @dataclass(frozen=True)
@@ -106,6 +109,16 @@ def collect(rows: Sequence[Row], codecs: Sequence[Codec]) -> list[Results]:
     return out
 
 
+def measured(results: Sequence[Results]) -> dict[str, str]:
+    """Metrics that were measured, each with its name in files."""
+    some = next((row for one in results for rows in one.rows.values() for row in rows), None)
+    return {
+        metric: metric.lower().replace("-", "").replace(" ", "")
+        for metric in METRICS
+        if metric != "SSIMULACRA 2" or (some is not None and some.perceptual)
+    }
+
+
 def published() -> list[Results]:
     """Reads published curves of the 24 Kodak pictures; ``published.json`` names their sources."""
     entries = json.loads(Path(__file__).with_name("published.json").read_text("utf-8"))
@@ -155,11 +168,11 @@ def to_csv(results: Sequence[Results], rates: tuple[float, float]) -> str:
             (name, "", value, n)
             for name, value in zip(("encode_cpu_s", "decode_cpu_s"), seconds(one), strict=True)
         ]
-        for metric in METRICS:
+        for metric in measured(results):
             for anchor in results:
                 if anchor is not one and not anchor.published:
                     c = compare(one, anchor, metric, rates)
-                    name = f"bd_{metric.lower().replace('-', '_')}"
+                    name = f"bd_{metric.lower().replace('-', '_').replace(' ', '')}"
                     lines += [
                         (f"{name}_mean_pct", anchor.name, c.mean, c.pictures),
                         (f"{name}_curve_pct", anchor.name, c.curve, n),
@@ -177,7 +190,7 @@ def tables(results: Sequence[Results], rates: tuple[float, float]) -> str:
     anchors = [r for name in ANCHORS for r in results if r.name == name]
     anchors = anchors or [r for r in results if not r.published][:1]
     span = f"{rates[0]:g} to {rates[1]:g} bpp"
-    for metric in METRICS:
+    for metric in measured(results):
         parts += [
             f"BD-rate by {metric} over {span}: mean of the pictures' (that of the mean curve) "
             "[pictures with fewer bits/compared]",

@@ -19,8 +19,9 @@ if TYPE_CHECKING:
 
 RD = """Rate-distortion of every picture of a folder by every codec, in one run: whole files, the
 same 8-bit pixels, PSNR and MS-SSIM over RGB, CPU seconds of each call on one thread. DIR receives
-rd.csv (all measurements), summary.csv and summary.md (BD-rates), psnr and msssim as .png and .svg.
-Pictures with transparency are judged on black and on white; codecs without it leave them out."""
+rd.csv (all measurements), summary.csv and summary.md (BD-rates), and a plot for each measure as
+.png and .svg. Pictures with transparency are judged on black and on white; codecs without it leave
+them out."""
 
 
 def arguments() -> argparse.ArgumentParser:
@@ -38,8 +39,11 @@ def arguments() -> argparse.ArgumentParser:
     add("--dataset", metavar="FOLDER", help="the same, by name")
     add("-o", "--out", metavar="DIR", default="rd", help="where the results go; default rd")
     add("--codecs", metavar="A,B", help="default jpeg,webp,jp2,jxl,avif420,avif444,pxi-fast,pxi; "
-        "more are avif420-s0, pxi-masks, pxi-implicit")  # fmt: skip
-    add("--speed0", action="store_true", help="also AVIF at speed 0, which is slow")
+        "more are avif420-s0, avif444-s0 to -s3, svt, pxi-masks, pxi-implicit")  # fmt: skip
+    add("--speed0", action="store_true", help="also AVIF 4:2:0 and 4:4:4 at speed 0, which is slow")
+    add("--equal-time", action="store_true", help="also AVIF 4:4:4 at the speed that takes about "
+        "as long as pxi; it is tried on the first picture")  # fmt: skip
+    add("--perceptual", action="store_true", help="also SSIMULACRA 2, about half a second a file")
     add("--masks", metavar="FOLDER", help="label maps NAME.png, or folders NAME of masks: also "
         "pxi-masks, with their layers, on the pictures that have one")  # fmt: skip
     add("--images", metavar="N|A,B", help="only the first N pictures, or these names")
@@ -89,7 +93,9 @@ def rate_distortion(args: argparse.Namespace, command: str) -> None:
     out = Path(args.out)
     check_out(out, args)
     sources = rd.find(folder, args.images, None if args.masks is None else Path(args.masks))
-    tasks = rd.plan(sources, chosen)
+    if args.equal_time:
+        chosen = list(dict.fromkeys([*chosen, rd.as_slow(sources[0], args.effort)]))
+    tasks = rd.plan(sources, chosen, args.perceptual)
     if not tasks:
         raise UsageError("nothing to do: no chosen codec can code these pictures")
 
@@ -173,7 +179,7 @@ def choose(args: argparse.Namespace) -> list[Codec]:
     names = [n for n, c in table.items() if c.default]
     if args.codecs is not None:
         names = args.codecs.split(",")
-    names += ["avif420-s0"] * args.speed0 + ["pxi-masks"] * (args.masks is not None)
+    names += ["avif420-s0", "avif444-s0"] * args.speed0 + ["pxi-masks"] * (args.masks is not None)
     unknown = [n for n in names if n not in table]
     if unknown:
         raise UsageError(f"unknown codec {unknown[0]!r}; there are {', '.join(table)}")

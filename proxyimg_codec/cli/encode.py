@@ -116,6 +116,9 @@ def _add_details(p: argparse.ArgumentParser) -> None:
     add("--feature-bits", type=int, metavar="2-8", help="bits a code; from quality by default")
     add("--net-bits", type=int, metavar="2-8", help="bits a network weight; default 8; "
         "like --feature-bits for texture implicit")  # fmt: skip
+    add("--tiles", choices=["auto", "always", "never"], default="auto", help="tiles, by which a "
+        "region is decoded without the rest: auto has them where a picture is large and they cost "
+        "0.5 %% at most (default); pyramid")  # fmt: skip
     add("--seed", type=int, default=0, help="seed of everything random; default 0")
     add("-j", "--jobs", type=int, metavar="N", help="cores to use, all by default: of several "
         "pictures so many at once, for one by threads, of which 4 are of use")  # fmt: skip

@@ -103,8 +103,9 @@ def encode(
     plan = with_meshes(premultiplied, plan, settings)
     if settings.pyramid and (behind is not None or not plain(premultiplied)):
         from .pyramid.picture import encode_picture
+        from .pyramid.tiles import with_tiles
 
-        image = encode_picture(picture, plan, settings, report, source)
+        image = with_tiles(encode_picture(picture, plan, settings, report, source), settings)
     else:
         image = _with_network(premultiplied, plan, settings, report)
     return replace(image, depth=depth, blocks=dict(blocks or {}))

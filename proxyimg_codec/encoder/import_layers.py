@@ -26,7 +26,7 @@ from .encode import Progress, check_blocks, fit_image
 from .implicit.fit_problem import Problem, build_apart
 from .layered.source import LayeredPicture, SourceLayer
 from .settings import Settings
-from .shapes.layers import LayerPlan, Plan, plan_layers, with_room
+from .shapes.layers import LayerPlan, Plan, plan_layers
 from .shapes.masks import unique_names
 from .shapes.meshes import with_meshes
 
@@ -133,6 +133,7 @@ def _stacked(
 ) -> Picture:  # fmt: skip
     """Encodes layers with pyramid textures."""
     from .pyramid.stack import encode_stack
+    from .pyramid.tiles import with_tiles
 
     def pixels_of(number: int, box: Box) -> Floats:
         pixels = _on_canvas(picture.layers[number], box)
@@ -145,7 +146,8 @@ def _stacked(
         return _merged([found], picture, covered)
 
     pairs = list(zip(plans, channels, strict=True))
-    return encode_stack(pairs, pixels_of, finished, composite(picture), settings, report)
+    found = encode_stack(pairs, pixels_of, finished, composite(picture), settings, report)
+    return with_tiles(found, settings)
 
 
 def _fitted(
@@ -247,7 +249,6 @@ def _plan(layer: SourceLayer, picture: LayeredPicture, settings: Settings) -> Pl
     y1 = min(layer.y + height + MARGIN, picture.height)
     alone = _on_canvas(layer, (x0, y0, x1 - x0, y1 - y0))
     plan = plan_layers(alone, replace(settings, max_layers=1), None)
-    plan = with_room(plan, alone[..., 3], settings) if settings.pyramid else plan
     outline = plan.layers[0].boundary
     if outline is None:
         return replace(plan, layers=(LayerPlan(layer.name, None),))

@@ -42,6 +42,7 @@ TUNES = ("mse", "ms-ssim")
 SAMPLINGS = ("direct", "node")
 BOUNDARIES = ("lsq", "chamfer")
 MATTES = ("auto", "hard", "soft")
+TILES = ("auto", "always", "never")
 BACKGROUNDS = ("auto", "smooth", "exemplar", "complete", "none")
 
 
@@ -84,6 +85,8 @@ class Settings:
             wider than antialiasing, in opaque pictures with pyramids.
         mesh: Name of the mesher, see `plugins`; ``none`` stores no meshes, and edits make them when
             needed; None = delaunay for implicit textures, else none.
+        tiles: Tiles of planes, by which regions decode their part of a file alone: ``always``,
+            ``never``, or ``auto`` where a raster is large and they cost little; pyramid only.
         seed: Seed of all random numbers, 0..2**32 - 1.
         jobs: Number of threads, at least 1.
         device: ``cpu`` or ``cuda``; ``cuda`` is for implicit textures only.
@@ -109,6 +112,7 @@ class Settings:
     background: str = "auto"
     matte: str = "auto"
     mesh: str | None = None
+    tiles: str = "auto"
     seed: int = 0
     jobs: int = 2
     device: str = "cpu"
@@ -143,6 +147,7 @@ class Settings:
                 f"{', '.join(BACKGROUNDS)} or an inpainter",
             ),
             (self.matte in MATTES, "matte", " or ".join(MATTES)),
+            (self.tiles in TILES, "tiles", " or ".join(TILES)),
             (0 <= self.seed < 1 << 32, "seed", "0..2^32-1"),
             (self.jobs >= 1, "jobs", "at least 1"),
             (self.device in ("cpu", "cuda"), "device", "cpu or cuda"),
@@ -166,6 +171,7 @@ class Settings:
         if len(aims) > 1:
             raise UsageError(f"{' and '.join(aims)} contradict each other")
         aims += ["tune ms-ssim"] if self.tune != "mse" else []
+        aims += ["tiles always"] if self.tiles == "always" else []
         aims += ["matte soft"] if self.matte == "soft" else []
         chosen = self.background == "exemplar" or self.inpainter is not None
         aims += [f"background {self.background}"] if chosen else []

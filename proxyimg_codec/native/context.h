@@ -1,8 +1,12 @@
 // The context network of the pyramid, texture/context.py, statement by statement; numpy is its judge.
 #pragma once
 
+#include <memory>
+
+#include "bytes.h"
 #include "laplace.h"
 #include "linear.h"
+#include "window.h"
 
 namespace PXI_LEVEL {
 
@@ -58,8 +62,11 @@ inline Wrong decode_lowest(Lowest &s) {
     return NOTHING;
 }
 
-typedef Linear<Whole, 2> Layer;
-typedef Layer::Sums Sums;
+typedef Linear<Whole, 2> Signed;  // layers of features, and of activations
+typedef Active<2> Layer;
+typedef Active<LANES == 4 ? 2 : 1> Six;
+typedef Active<LANES == 4 ? 3 : LANES == 8 ? 2 : 1> Twelve;
+typedef Vectors<ints, 2> Sums;
 typedef int16_t shorts __attribute__((vector_size(2 * LANES)));
 
 // Sums of whole numbers times 2**-bits, rounded down: the layers have added a half.
@@ -69,7 +76,7 @@ static inline Sums scaled(Sums v, int bits) {
 }
 static int half(int bits) { return bits > 0 ? 1 << (bits - 1) : 0; }
 
-// Layer::UNIT numbers to memory, within bounds, and from there.
+// Numbers to memory, within the bounds of int16, and from there.
 static inline void put(int16_t *to, Sums s, int32_t low, int32_t high) {
     for (ints v : s.v) {
         v = v < low ? (ints){} + low : v;
@@ -78,10 +85,11 @@ static inline void put(int16_t *to, Sums s, int32_t low, int32_t high) {
         to += LANES;
     }
 }
-static inline Sums get(const int16_t *from) {
+template <class Number> static inline Sums get(const Number *from) {
+    typedef Number numbers __attribute__((vector_size(sizeof(Number) * LANES)));
     Sums out;
     for (ints &v : out.v) {
-        shorts n;
+        numbers n;
         std::memcpy(&n, from, sizeof n);
         v = __builtin_convertvector(n, ints);
         from += LANES;
@@ -89,37 +97,103 @@ static inline Sums get(const int16_t *from) {
     return out;
 }
 
+// Activations to memory.
+static inline void activate(int16_t *to, Sums s) { put(to, s, 0, 255); }
+#if defined(__AVX2__) && !defined(__AVX512F__)
+static inline void activate(uint8_t *to, Sums s) {  // packing saturates
+    __m256i n = _mm256_packs_epi32((__m256i)s.v[0], (__m256i)s.v[1]);
+    n = _mm256_permute4x64_epi64(n, 0xd8);
+    const __m128i all = _mm_packus_epi16(_mm256_castsi256_si128(n), _mm256_extracti128_si256(n, 1));
+    std::memcpy(to, &all, sizeof all);
+}
+#else
+static inline void activate(uint8_t *to, Sums s) {
+    typedef uint8_t bytes __attribute__((vector_size(LANES)));
+    for (ints v : s.v) {
+        v = v < 0 ? (ints){} : v;
+        const bytes n = __builtin_convertvector(v > 255 ? (ints){} + 255 : v, bytes);
+        std::memcpy(to, &n, sizeof n);
+        to += LANES;
+    }
+}
+#endif
+
+// Tells outputs of a layer, `count` means and then as many scales, that make all latents certain.
+template <class L> class Certain {
+    typename L::Sums add{}, shift{}, low{}, high{};
+
+  public:
+    Certain(int bits, int count, int more, int certain) {
+        const auto at = [](typename L::Sums &of, int i) -> int32_t & { return ((int32_t *)&of)[i]; };
+        for (int i = 0; i < L::UNIT; i++) {
+            const bool mean = i < count, scale = !mean && i < 2 * count;
+            at(add, i) = mean ? 1 << bits >> 1 : scale ? 1 << bits : 0;
+            at(shift, i) = mean ? bits : scale ? bits + 1 : 0;
+            at(low, i) = mean ? -4 : INT32_MIN;
+            at(high, i) = mean ? 4 : scale ? certain - 32 - more : INT32_MAX;
+        }
+    }
+    bool operator()(const typename L::Sums &v) const {
+        ints not_so{};
+        for (size_t k = 0; k < std::size(v.v); k++) {
+            const ints n = (v.v[k] + add.v[k]) >> shift.v[k];
+            not_so |= (n < low.v[k]) | (n > high.v[k]);
+        }
+        uint64_t parts[sizeof not_so / 8], any = 0;
+        std::memcpy(parts, &not_so, sizeof not_so);
+        for (const uint64_t part : parts) any |= part;
+        return !any;
+    }
+};
+
 class LevelCoder {
     static constexpr int FAR = 508;  // from here on the squashed feature is 127
+    static constexpr int PLANES = 4;  // with padding
+    static constexpr int ZERO = 128;  // what features are stored above, so that none is negative
+    static constexpr int FIVE = 92;   // features of five positions, with padding
 
     const Level &s;
     LatentCoder coder;
     const int h, w, hidden, width;  // width: hidden units with padding
-    const int64_t size, pitch, in_row, row;
-    Layer first, second, causal, mix, luma, from_luma, chroma;
+    const int64_t size, pitch, row;
+    Layer first, first_planes, second, causal, mix;
+    Signed from_luma;
+    Six luma;
+    Twelve chroma;
+    Certain<Six> sure_luma;
+    Certain<Twelve> sure_chroma;
     int16_t squash[FAR + 1];
-    std::vector<int16_t> inputs, rows;   // three rows [w + 2][12], [w + 2][width]
-    std::vector<int16_t> ahead, seen;    // [h][w][width], [h + 2][pitch][18]
+    Window<Activation, PLANES> inputs;
+    Rows<Activation> rows;               // of activations, [w + 2][width]
+    const std::unique_ptr<int16_t[]> ahead;  // [h][w][width]
+    std::vector<Activation> seen;        // [h + 2][pitch][18]
     std::vector<uint8_t> busy;           // [h + 2][pitch] whether a latent is not 0
-    // Of a wave: positions (ys[i], wave - 3 ys[i]), activations [width], features, outputs, latents [9],
-    // and which positions are not quiet.
+    // Of a wave: positions (ys[i], wave - 3 ys[i]), activations [width], features, latents [9], whether
+    // one of these is not 0, and lists of positions: some to work on, and those with such latents.
     int at;
-    std::vector<int32_t> ys, outputs, found, loud;
-    std::vector<int16_t> z, mixed, features;
+    std::vector<int32_t> ys, found, some, alive;
+    std::vector<Activation> z, mixed;
+    std::vector<int16_t> features;
+    std::vector<uint8_t> lit;
+    std::vector<int32_t> dark;           // [width] what latents of luma that are 0 add
     std::vector<Symbol> symbols;         // those that are not certain
     std::vector<int32_t> places;         // in `found` of their values
+    std::vector<int32_t> sums;           // [w + 2] of three rows
+    std::vector<float> high;             // [w]
+    std::vector<uint8_t> coarse;         // [(w + 1) / 2] whether a latent of the parents is not 0
 
-    // 32 x / (1 + x / 4) for x = numerator / unit >= 0.
-    static int squashed(int numerator, int unit) {
-        const int v = std::min(numerator, FAR * unit), under = 4 * unit + v;
-        return (128 * v + under / 2) / under;
+    // 32 x / (1 + x / 4) for x = n / unit, 0 <= n <= FAR * unit, a whole number. The quotient of floats,
+    // which hold all that is below 2**24, does not reach the next whole number by rounding.
+    static float squashed(int n, int unit) {
+        const int under = 4 * unit + n;
+        return (float)(128 * n + under / 2) / (float)under;
     }
     int16_t feature(int v) const { return v < 0 ? -squash[std::min(-v, FAR)] : squash[std::min(v, FAR)]; }
     int16_t log_feature(int v) const { return (int16_t)s.logs[std::min<int64_t>(std::abs(v), s.n_logs - 1)]; }
     int64_t index(int i) const { return (int64_t)ys[i] * w + at - 3 * ys[i]; }
-    int16_t *own(int i) { return z.data() + (int64_t)i * width; }
+    Activation *own(int i) { return z.data() + (int64_t)i * width; }
     int64_t padded(int i) const { return (ys[i] + 2) * pitch + at - 3 * ys[i] + 2; }
-    int16_t *place(int i) { return seen.data() + 18 * padded(i); }
+    Activation *place(int i) { return seen.data() + 18 * padded(i); }
 
     // Whether all latents that the causal layer sees are 0, so that it adds nothing.
     bool quiet(int i) const {
@@ -134,27 +208,41 @@ class LevelCoder {
         return !(((up | above) & mask) | left);
     }
 
-    // A row of inputs.
-    void read(int y, int16_t *to) const {
-        if (y >= h) {
-            std::fill_n(to, in_row, (int16_t)0);
-            return;
+    // The last row of inputs.
+    void read(int y) {
+        Activation *to = inputs.all[2];
+        uint8_t *any = inputs.busy[2];
+        if (y < h && y % 2) {  // the same parents
+            std::copy_n(inputs.all[1], (w + 2) * 12, to), std::copy_n(inputs.busy[1], w + 2, any);
+        } else {
+            std::fill_n(to, (w + 2) * 12, (Activation)ZERO), std::fill_n(any, w + 2, (uint8_t)0);
+            if (y < h) read_parents(y / 2, to + 12, any + 1);
         }
-        to += 12;
-        for (int c = 0; c < 3; c++) {
-            const int32_t *middle = s.low + c * size + (int64_t)y * w, *up = y ? middle - w : middle,
-                          *down = y + 1 < h ? middle + w : middle;
-            const auto column = [&](int x) { return up[x] + middle[x] + down[x]; };
-            for (int x = 0; x < w; x++) {
-                const int around = column(std::max(x - 1, 0)) + column(x) + column(std::min(x + 1, w - 1));
-                const int v = 9 * middle[x] - around, f = squashed(std::abs(v), 144);
-                to[12 * x + c] = (int16_t)(v < 0 ? -f : f);
-            }
+        for (int c = 0; c < 3 && y < h; c++) read_plane(c, y, to + 12 + c);
+        inputs.filled(2);
+    }
+    void read_plane(int c, int y, Activation *to) {
+        const int32_t *middle = s.low + c * size + (int64_t)y * w, *up = y ? middle - w : middle,
+                      *down = y + 1 < h ? middle + w : middle;
+        int32_t *column = sums.data() + 1;
+        float *out = high.data();
+        for (int x = 0; x < w; x++) column[x] = up[x] + middle[x] + down[x];
+        column[-1] = column[0], column[w] = column[w - 1];
+        for (int x = 0; x < w; x++) {
+            const int v = 9 * middle[x] - (column[x - 1] + column[x] + column[x + 1]);
+            const float f = squashed(std::min(std::abs(v), FAR * 144), 144);
+            out[x] = v < 0 ? -f : f;
         }
-        const int64_t half = (w + 1) / 2, quarter = half * ((h + 1) / 2);
-        for (int c = 0; c < 9; c++) {
-            const int32_t *from = s.parent + c * quarter + (y / 2) * half;
-            for (int x = 0; x < w; x++) to[12 * x + 3 + c] = log_feature(from[x / 2]);
+        for (int x = 0; x < w; x++) to[12 * x] = (Activation)(ZERO + (int)out[x]);
+    }
+    void read_parents(int y, Activation *to, uint8_t *any) {
+        const int half = (w + 1) / 2;
+        const int64_t quarter = (int64_t)half * ((h + 1) / 2);
+        find_busy(s.parent, quarter, (int64_t)y * half, half, coarse.data());
+        for (int x = 0; x < w; x++) {
+            if (!(any[x] = coarse[x / 2])) continue;
+            const int32_t *from = s.parent + (int64_t)y * half + x / 2;
+            for (int c = 0; c < 9; c++) to[12 * x + 3 + c] = (Activation)(ZERO + log_feature(from[c * quarter]));
         }
     }
 
@@ -165,26 +253,24 @@ class LevelCoder {
 
     // What does not depend on the level itself.
     Wrong look_ahead() {
-        int16_t *last_in = inputs.data() + 2 * in_row, *last = rows.data() + 2 * row;
-        read(0, last_in);
+        read(0);
         for (int y = 0; y <= h; y++) {
             if (stopped(y)) return STOPPED;
-            std::memmove(inputs.data(), inputs.data() + in_row, 2 * in_row * sizeof(int16_t));
-            std::memmove(rows.data(), rows.data() + row, 2 * row * sizeof(int16_t));
-            read(y + 1, last_in);
-            const auto window = [&](int x) { return inputs.data() + 12 * x; };
-            const auto wider = [&](int x) { return rows.data() + (int64_t)x * width; };
+            inputs.up();
+            rows.up();
+            Activation *last = rows[2];
+            read(y + 1);
             if (y < h)
-                first(w, window, [&](int x, int o, Sums v) {
-                    put(last + (int64_t)(x + 1) * width + o, scaled(v, s.net.first_bits), 0, 255);
+                inputs(first, first_planes, w, [&](int x, int o, Sums v) {
+                    activate(last + (int64_t)(x + 1) * width + o, scaled(v, s.net.first_bits));
                 });
             else
-                std::fill_n(last, row, (int16_t)0);
-            if (y > 0)
-                second(w, wider, [&](int x, int o, Sums v) {
-                    const int64_t i = (int64_t)(y - 1) * w + x;
-                    put(ahead.data() + i * width + o, scaled(v, s.net.second_bits), -32768, 32767);
-                });
+                std::fill_n(last, row, (Activation)0);
+            if (y == 0) continue;
+            int16_t *to = ahead.get() + (int64_t)(y - 1) * w * width;
+            second(w, [&](int x) { return rows[0] + (int64_t)x * width; }, [&](int x, int o, Sums v) {
+                put(to + (int64_t)x * width + o, scaled(v, s.net.second_bits), -32768, 32767);
+            });
         }
         return NOTHING;
     }
@@ -194,81 +280,94 @@ class LevelCoder {
         const int n = (int)ys.size();
         const auto mine = [&](int i) { return own(i); };
         const auto begin = [&](int i, int o, Sums v) {
-            const Sums more = get(ahead.data() + index(i) * width + o);
+            const Sums more = get(ahead.get() + index(i) * width + o);
             for (int k = 0; k < 2; k++) v.v[k] = (v.v[k] + more.v[k] + 4) >> 3;
-            put(own(i) + o, v, 0, 255);
+            activate(own(i) + o, v);
         };
-        loud.clear();
-        for (int i = 0; i < n; i++)
+        some.clear();
+        for (int i = 0; i < n; i++) {
+            __builtin_prefetch(ahead.get() + (index(i) + 2) * width);
             if (!quiet(i))
-                loud.push_back(i);
+                some.push_back(i);
             else
-                for (int o = 0; o < width; o += Layer::UNIT) begin(i, o, {});
-        causal((int)loud.size(), [&](int k) { return place(loud[k]); }, [&](int k, int o, Sums v) {
-            begin(loud[k], o, scaled(v, s.net.causal_bits));
+                for (int o = 0; o < width; o += Signed::UNIT) begin(i, o, {});
+        }
+        causal((int)some.size(), [&](int k) { return place(some[k]); }, [&](int k, int o, Sums v) {
+            begin(some[k], o, scaled(v, s.net.causal_bits));
         });
         mix(n, mine, [&](int i, int o, Sums v) {
-            put(mixed.data() + (int64_t)i * width + o, scaled(v, s.net.mix_bits), 0, 255);
+            activate(mixed.data() + (int64_t)i * width + o, scaled(v, s.net.mix_bits));
         });
         z.swap(mixed);
-        if (const Wrong wrong = coded(luma, s.net.luma_bits, 0, 3, s.shifts[0])) return wrong;
+        alive.clear();
+        if (const Wrong wrong = coded(luma, s.net.luma_bits, 0, 3, s.shifts[0], sure_luma)) return wrong;
         if (!s.grey) {
-            for (int i = 0; i < n; i++) described(features.data() + 6 * i, i, 3);
-            from_luma(n, [&](int i) { return features.data() + 6 * i; }, [&](int i, int o, Sums v) {
-                const Sums before = get(own(i) + o);
-                v = scaled(v, s.net.from_luma_bits);
-                for (int k = 0; k < 2; k++) v.v[k] = (8 * before.v[k] + v.v[k] + 4) >> 3;
-                put(own(i) + o, v, 0, 255);
-            });
-            if (const Wrong wrong = coded(chroma, s.net.chroma_bits, 3, 6, s.shifts[1])) return wrong;
+            add_luma(n);
+            if (const Wrong wrong = coded(chroma, s.net.chroma_bits, 3, 6, s.shifts[1], sure_chroma)) return wrong;
         }
-        for (int i = 0; i < n; i++) {
-            const int32_t *own = found.data() + 9 * i;
-            if (std::all_of(own, own + 9, [](int32_t v) { return v == 0; })) continue;
-            described(place(i), i, 9);
-            busy[padded(i)] = 1;
+        for (const int i : alive) {
+            described(place(i), i, 9, ZERO);
+            busy[padded(i)] = 1, lit[i] = 0;
+            std::fill_n(found.data() + 9 * i, 9, 0);
         }
         return NOTHING;
     }
 
-    // Two features each of the first `count` latents of a position.
-    void described(int16_t *to, int i, int count) const {
+    // Adds what the luma of the n positions of a wave tells of their chroma.
+    void add_luma(int n) {
+        const auto add = [&](int i, int o, Sums v) {
+            const Sums before = get(own(i) + o);
+            for (int k = 0; k < 2; k++) v.v[k] = (8 * before.v[k] + v.v[k] + 4) >> 3;
+            activate(own(i) + o, v);
+        };
+        for (int i = 0; i < n; i++)
+            if (!lit[i])
+                for (int o = 0; o < width; o += Signed::UNIT) add(i, o, get(dark.data() + o));
+        const int count = (int)alive.size();
+        for (int k = 0; k < count; k++) described(features.data() + 6 * k, alive[k], 3, 0);
+        from_luma(count, [&](int k) { return features.data() + 6 * k; }, [&](int k, int o, Sums v) {
+            add(alive[k], o, scaled(v, s.net.from_luma_bits));
+        });
+    }
+
+    // Two features each of the first `count` latents of a position, and `zero` more.
+    template <class Number> void described(Number *to, int i, int count, int zero) const {
         for (int c = 0; c < count; c++) {
             const int32_t v = found[9 * i + c];
-            to[c] = feature(v), to[count + c] = log_feature(v);
+            to[c] = (Number)(zero + feature(v)), to[count + c] = (Number)(zero + log_feature(v));
         }
     }
 
     // Codes channels from .. from + count - 1 of the wave, whose distributions a layer gives.
-    Wrong coded(const Layer &layer, int bits, int from, int count, int shift) {
-        const int n = (int)ys.size(), stride = layer.outputs();
-        layer(n, [&](int i) { return own(i); }, [&](int i, int o, Sums v) {
-            std::memcpy(outputs.data() + (int64_t)i * stride + o, &v, sizeof v);
-        });
+    template <class L> Wrong coded(const L &layer, int bits, int from, int count, int shift, const Certain<L> &sure) {
+        const int n = (int)ys.size();
         symbols.clear(), places.clear();
-        for (int i = 0; i < n; i++) {
+        layer(n, [&](int i) { return own(i); }, [&](int i, int, typename L::Sums v) {
+            if (sure(v)) return;
+            int32_t out[L::UNIT];
+            v.put(out);
             const int bands = s.bands[index(i)];
             for (int c = 0; c < count; c++) {
-                found[9 * i + from + c] = 0;
                 if (!(bands >> c % 3 & 1)) continue;
-                const int32_t *out = outputs.data() + (int64_t)i * stride + c;
-                const int mean = (out[0] + (1 << bits >> 1)) >> bits;
-                const int scale = ((out[count] + (1 << bits)) >> (bits + 1)) + 32 + shift;
+                const int mean = (out[c] + (1 << bits >> 1)) >> bits;
+                const int scale = ((out[count + c] + (1 << bits)) >> (bits + 1)) + 32 + shift;
                 const Symbol symbol = coder.located(std::clamp(mean, -(1 << 14), 1 << 14),
                                                     std::clamp(scale, 0, s.tables.scales - 1));
                 if (symbol.row < 0) continue;
                 symbols.push_back(symbol), places.push_back(9 * i + from + c);
                 if (s.given) symbols.back().value = s.given[(from + c) * size + index(i)];
             }
-        }
+        });
         if (s.given)
             coder.encode(symbols);
         else if (const Wrong wrong = coder.decode(symbols))
             return wrong;
         for (size_t k = 0; k < symbols.size(); k++)
             if (const int32_t value = (int32_t)symbols[k].value) {  // they are 0 already
+                const int i = places[k] / 9;
                 found[places[k]] = value;
-                s.latents[places[k] % 9 * size + index(places[k] / 9)] = value;
+                s.latents[places[k] % 9 * size + index(i)] = value;
+                if (!lit[i]) lit[i] = 1, alive.push_back(i);
             }
         return NOTHING;
     }
@@ -277,34 +376,28 @@ class LevelCoder {
     explicit LevelCoder(Level &level)
         : s(level), coder{level.tables, level.source, level.sink}, h(s.height), w(s.width),
           hidden(s.net.hidden), width(Layer::padded(hidden)), size((int64_t)h * w), pitch(w + 4),
-          in_row((w + 2) * 12), row((int64_t)(w + 2) * width),
-          first(square(3, 12, in_row), hidden, s.net.first_bias, half(s.net.first_bits)),
+          row((int64_t)(w + 2) * width),
+          first(square(3, 12, (w + 2) * 12), hidden, s.net.first_bias, half(s.net.first_bits)),
+          first_planes(square(3, PLANES, (w + 2) * PLANES), hidden, s.net.first_bias, half(s.net.first_bits)),
           second(square(3, width, row), hidden, s.net.second_bias, half(s.net.second_bits)),
-          causal({{-36 * (pitch + 1), 90}, {-18 * (pitch + 2), 90}, {-36, 36}}, hidden, nullptr,
+          causal({{-36 * (pitch + 1), FIVE}, {-18 * (pitch + 2), FIVE}, {-36, 36}}, hidden, nullptr,
                  half(s.net.causal_bits)),
           mix({{0, width}}, hidden, s.net.mix_bias, half(s.net.mix_bits)),
-          luma({{0, width}}, 6, s.net.luma_bias),
           from_luma({{0, 6}}, hidden, s.net.from_luma_bias, half(s.net.from_luma_bits)),
-          chroma({{0, width}}, 12, s.net.chroma_bias), inputs(3 * in_row), rows(3 * row),
-          ahead(size * width), seen((h + 2) * pitch * 18), busy((h + 2) * pitch + 8) {
-        const ContextNet &n = s.net;
+          luma({{0, width}}, 6, s.net.luma_bias), chroma({{0, width}}, 12, s.net.chroma_bias),
+          sure_luma(s.net.luma_bits, 3, s.shifts[0], s.tables.certain),
+          sure_chroma(s.net.chroma_bits, 6, s.shifts[1], s.tables.certain), inputs(3, w + 2, ZERO), rows(3, row),
+          ahead(new int16_t[size * width]), seen((h + 2) * pitch * 18 + FIVE, ZERO), busy((h + 2) * pitch + 8), dark(width), sums(w + 2),
+          high(w), coarse((w + 1) / 2) {
         const size_t most = std::min(h, (w + 2) / 3);  // positions of a wave
         z.resize(most * width), mixed.resize(most * width), features.resize(most * 6), found.resize(most * 9);
-        outputs.resize(most * chroma.outputs());
+        lit.resize(most);
         for (int v = 0; v <= FAR; v++) squash[v] = (int16_t)squashed(v, 1);
-        for (int o = 0; o < hidden; o++) {
-            for (int tap = 0; tap < 9; tap++) {
-                for (int i = 0; i < 12; i++) first.set(12 * tap + i, o, n.first[(o * 12 + i) * 9 + tap]);
-                for (int i = 0; i < hidden; i++)
-                    second.set(width * tap + i, o, n.second[(o * hidden + i) * 9 + tap]);
-            }
-            for (int tap = 0; tap < 12; tap++)
-                for (int i = 0; i < 18; i++) causal.set(18 * tap + i, o, n.causal[(o * 18 + i) * 12 + tap]);
-            for (int i = 0; i < hidden; i++) mix.set(i, o, n.mix[o * hidden + i]);
-            for (int i = 0; i < 6; i++) from_luma.set(i, o, n.from_luma[o * 6 + i]);
-            for (int i = 0; i < 6; i++) luma.set(o, i, n.luma[i * hidden + o]);
-            for (int i = 0; i < 12; i++) chroma.set(o, i, n.chroma[i * hidden + o]);
-        }
+        set_weights(s.net);
+        const int16_t nothing[6] = {};
+        from_luma(1, [&](int) { return nothing; }, [&](int, int o, Sums v) {
+            scaled(v, s.net.from_luma_bits).put(dark.data() + o);
+        });
     }
 
     // Codes the level.
@@ -319,6 +412,29 @@ class LevelCoder {
                 if (const Wrong wrong = wave()) return wrong;
         }
         return NOTHING;
+    }
+
+  private:
+    void set_weights(const ContextNet &n) {
+        for (int o = 0; o < hidden; o++) {
+            for (int tap = 0; tap < 9; tap++) {
+                for (int i = 0; i < 12; i++) {
+                    const int32_t weight = n.first[(o * 12 + i) * 9 + tap];
+                    first.set(12 * tap + i, o, weight, ZERO);
+                    if (i < 3) first_planes.set(PLANES * tap + i, o, weight, ZERO);
+                }
+                for (int i = 0; i < hidden; i++)
+                    second.set(width * tap + i, o, n.second[(o * hidden + i) * 9 + tap]);
+            }
+            for (int tap = 0; tap < 12; tap++)
+                for (int i = 0; i < 18; i++)
+                    causal.set(tap / 5 * FIVE + tap % 5 * 18 + i, o, n.causal[(o * 18 + i) * 12 + tap], ZERO);
+            for (int i = 0; i < hidden; i++) mix.set(i, o, n.mix[o * hidden + i]);
+            for (int i = 0; i < 6; i++) from_luma.set(i, o, n.from_luma[o * 6 + i]);
+            for (int i = 0; i < 6; i++) luma.set(o, i, n.luma[i * hidden + o]);
+            for (int i = 0; i < 12; i++) chroma.set(o, i, n.chroma[i * hidden + o]);
+        }
+        first.ready(), first_planes.ready(), second.ready(), causal.ready(), mix.ready(), luma.ready(), chroma.ready();
     }
 };
 

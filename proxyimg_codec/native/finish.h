@@ -22,6 +22,34 @@ inline void premultiplied(const float *output, int channels, int64_t n, float *t
     }
 }
 
+struct Still {  // points of a rectangle that lie on samples of a raster
+    const float *samples;          // [..][stride][channels]
+    const int64_t *rows, *columns;  // of the raster, of each row and column of points
+    const int64_t *at;             // [n] numbers of points that are painted, less `start`, ascending
+    float *colour;                 // [..][4] of points, by these numbers
+    uint8_t *known;                // [..] set to 1
+    int64_t stride, width, start, n;  // width: points of a row
+    int32_t channels;              // 1 or 3
+};
+
+// Puts colours of points, clamped as in `premultiplied`.
+inline void painted(const Still &s) {
+    const float *line = nullptr;
+    const int64_t second = s.channels == 3;
+    for (int64_t k = 0, first = 0, end = -1; k < s.n; k++) {
+        const int64_t point = s.at[k] + s.start;
+        if (point >= end) {
+            const int64_t row = point / s.width;
+            first = row * s.width, end = first + s.width;
+            line = s.samples + s.rows[row] * s.stride * s.channels;
+        }
+        const float *from = line + s.columns[point - first] * s.channels;
+        const float colour[3] = {from[0], from[second], from[2 * second]};
+        premultiplied(colour, 3, 1, s.colour + 4 * s.at[k]);
+        s.known[s.at[k]] = 1;
+    }
+}
+
 // Rounds n premultiplied samples [n][channels] to 0..most, `out` [n][3], or [n][4] with straight alpha.
 template <class Number>
 void finished(const float *samples, int channels, int64_t n, int components, float most, Number *out) {

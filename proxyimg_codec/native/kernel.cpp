@@ -95,6 +95,9 @@ void PXI(coloured)(const float *planes, const float *colours, int64_t n, float *
     coloured(planes, colours, n, out);
 }
 
+// The same, in 0..1 and clamped; see `shown`.
+void PXI(shown)(const float *planes, const float *colours, int64_t n, float *out) { shown(planes, colours, n, out); }
+
 // Coverage of pixels; 0 where there are too many pieces, see `coverage`.
 int PXI(coverage)(Cover *to, const int64_t *segments, const int64_t *log2, int64_t n) {
     return coverage(*to, segments, log2, n);
@@ -125,6 +128,9 @@ void PXI(blend)(float *result, float *clear, const float *colour, const float *c
 void PXI(premultiplied)(const float *output, int32_t channels, int64_t n, float *out) {
     premultiplied(output, channels, n, out);
 }
+
+// Colours of points that lie on samples; see `painted`.
+void PXI(painted)(const Still *points) { painted(*points); }
 
 // Output samples of `bits` 8 or 16; see `finished`.
 void PXI(finished)(const float *samples, int32_t channels, int64_t n, int32_t components, int32_t bits, void *out) {

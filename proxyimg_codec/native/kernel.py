@@ -82,11 +82,13 @@ _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     ),
     "pxi_sample": (None, [_ADDRESS, _LONG, _INT, ct.POINTER(Points), _ADDRESS]),
     "pxi_coloured": (None, [_ADDRESS, _ADDRESS, _LONG, _ADDRESS]),
+    "pxi_shown": (None, [_ADDRESS, _ADDRESS, _LONG, _ADDRESS]),
     "pxi_coverage": (ct.c_int, [ct.POINTER(Cover), _ADDRESS, _ADDRESS, _LONG]),
     "pxi_diffused": (ct.c_int, [_ADDRESS, _ADDRESS]),
     "pxi_completed": (ct.c_int, [_ADDRESS]),
     "pxi_blend": (None, [*(_ADDRESS,) * 4, _LONG]),
     "pxi_premultiplied": (None, [_ADDRESS, _INT, _LONG, _ADDRESS]),
+    "pxi_painted": (None, [_ADDRESS]),
     "pxi_finished": (None, [_ADDRESS, _INT, _LONG, _INT, _INT, _ADDRESS]),
     "pxi_train": (ct.c_double, [*(_ADDRESS,) * 2, *(_LONG,) * 3, *(_ADDRESS,) * 2]),
 }  # fmt: skip
@@ -240,6 +242,22 @@ def coloured(planes: NDArray[np.float32], colours: NDArray[np.float32]) -> NDArr
     out, colours = np.empty_like(planes), np.ascontiguousarray(colours)
     lib.pxi_coloured(pointer(planes), pointer(colours), planes.size // 3, pointer(out))
     return out
+
+
+def shown(
+    planes: NDArray[np.float32], colours: NDArray[np.float32], out: NDArray[np.float32]
+) -> None:
+    """Puts colours of planes, as `coloured` computes them, as samples in 0..1, clipped.
+
+    Args:
+        planes: float32 [h, w, 3] planes.
+        colours: float32 [3, 3] weights of the planes in each component.
+        out: float32 [h, w, 3].
+    """
+    lib = library()
+    assert lib is not None, "check available() first"
+    colours = np.ascontiguousarray(colours)
+    lib.pxi_shown(pointer(planes), pointer(colours), planes.size // 3, pointer(out))
 
 
 def blend(

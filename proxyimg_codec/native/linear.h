@@ -53,6 +53,25 @@ static std::vector<Stretch> square(int side, int channels, int64_t length) {
     return out;
 }
 
+// Vectors are copied one by one: what is stored in parts would have to reach memory before it is read.
+template <class Vector, int V> struct Vectors {
+    Vector v[V];
+    Vectors() = default;
+    Vectors(const Vectors &from) { *this = from; }
+    Vectors &operator=(const Vectors &from) {
+        for (int k = 0; k < V; k++) v[k] = from.v[k];
+        return *this;
+    }
+    template <class Number> static Vectors of(const Number *from) {
+        Vectors out;
+        for (int k = 0; k < V; k++) std::memcpy(&out.v[k], from + k * LANES, sizeof(Vector));
+        return out;
+    }
+    template <class Number> void put(Number *to) const {
+        for (int k = 0; k < V; k++) std::memcpy(to + k * LANES, &v[k], sizeof(Vector));
+    }
+};
+
 // A layer whose inputs lie in a few stretches of memory around each position. Outputs are computed
 // V vectors at a time, for TILE positions.
 template <class Kind, int V> class Linear {
@@ -63,9 +82,7 @@ template <class Kind, int V> class Linear {
 
   public:
     static constexpr int UNIT = V * LANES;
-    struct Sums {
-        typename Kind::Vector v[V];
-    };
+    typedef Vectors<typename Kind::Vector, V> Sums;
     static int padded(int n) { return (n + UNIT - 1) / UNIT * UNIT; }
 
     Linear(std::vector<Stretch> from, int n, const Sum *bias_, Sum more = 0)
@@ -75,10 +92,13 @@ template <class Kind, int V> class Linear {
         for (int o = 0; o < n; o++) ((Sum *)bias.data())[o] = (bias_ ? bias_[o] : 0) + more;
     }
     int outputs() const { return blocks * UNIT; }
-    void set(int input, int output, Sum weight) {
+    void set(int input, int output, Sum weight, Sum zero = 0) {  // zero: the input that adds nothing
+        ((Sum *)bias.data())[output] -= weight * zero;
         Sums &at = weights[(size_t)(output / UNIT) * steps + input / Kind::PER_STEP];
         ((Number *)&at)[output % UNIT * Kind::PER_STEP + input % Kind::PER_STEP] = (Number)weight;
     }
+
+    void ready() {}  // to be called when all weights are set
 
     // Calls out(i, first output, Sums) for each place in(i), i < n.
     template <class In, class Out> void operator()(int n, In in, Out out) const {
@@ -113,7 +133,7 @@ template <class Kind, int V> class Linear {
                 for (int p = 0; p < TILE; p++) {
                     typename Kind::Step x;
                     std::memcpy(&x, from[p] + k, sizeof x);
-#pragma GCC unroll 2
+#pragma GCC unroll 4
                     for (int v = 0; v < V; v++) sums[p].v[v] = Kind::add(sums[p].v[v], x, w.v[v]);
                 }
             }

@@ -47,6 +47,14 @@ inline void coloured(const float *planes, const float *colours, int64_t n, float
         }
 }
 
+// Samples as `coloured`, in 0..1 and clamped.
+inline void shown(const float *planes, const float *colours, int64_t n, float *out) {
+    for (int64_t k = 0; k < 3 * n; k += 3) {
+        coloured(planes + k, colours, 1, out + k);
+        for (int c = 0; c < 3; c++) out[k + c] = std::clamp(out[k + c] / 255, 0.f, 1.f);
+    }
+}
+
 // Puts n premultiplied colours [n][4], covered in part, behind what is there; coverage may be null.
 inline void blend(float *result, float *clear, const float *colour, const float *coverage, int64_t n) {
     for (int64_t k = 0; k < n; k++, result += 4, colour += 4) {

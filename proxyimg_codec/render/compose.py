@@ -23,7 +23,7 @@ from ..texture.network import Floats, Network
 from ..texture.occlusion import ALL_IN_PLACE, Moved
 from ..texture.planes import Planes
 from ..texture.pyramid import PyramidTexture
-from . import engines, finish_native
+from . import engines, finish_native, still
 from .cache import SAMPLES_MAX, Cache, Sheet
 from .neighbours import moved_neighbours, present_outline
 from .progress import Progress
@@ -227,12 +227,23 @@ class _Painter:
 
     def paint(self, sheet: Sheet, box: Rectangle, at: NDArray[np.int64]) -> None:
         """Computes colours of samples of a sheet; `at` are their numbers, from `sheet.start` on."""
+        if (found := self._still(box)) is not None:
+            still.paint(found, sheet, at)
+            return
         colour = self._textured(box, at + sheet.start)
         if len(at) == len(sheet.known):
             sheet.colour = colour
         else:
             sheet.colour[at] = colour
         sheet.known[at] = True
+
+    def _still(self, box: Rectangle) -> still.Still | None:
+        """Samples that the points of a rectangle lie on; None if they are not that simple."""
+        texture, (x, y, w, h) = self._layer.texture, box
+        if not (self.native and isinstance(texture, PyramidTexture)) or self._window is None:
+            return None
+        xs, ys = self._view.columns(x, x + w), self._view.rows(y, y + h)
+        return still.find(texture, xs, ys, self._layer.box, self._moved, self._seen)
 
     def posed(self, colour: Floats) -> Floats:
         """Applies the colour matrix and the opacity of the pose to premultiplied colours [n, 4]."""

@@ -88,6 +88,7 @@ class Decoding:
         self._made: dict[tuple[str, int], _Made] = {}
         self._read = self._grid.levels + 1  # finest level that the first stream was read of
         self._coder: Decoder | None = None
+        self._spoilt: set[int] = set()  # levels whose latents were read up to an error
         self._streams: list[tuple[bytes, bytes]] | None = None
         self._tiles: dict[int, list[tuple[Window, int]]] = {}
 
@@ -106,14 +107,19 @@ class Decoding:
             FormatError: The stream is corrupt.
         """
         with self._lock:
+            step, components = self._fields["step"], self._fields["components"]
             if level:
-                return self._coloured(self._low(level, window)[window.at], level)
+                small = np.empty((*window.shape, components), np.float32)
+                low = self._low(level, window)[window.at]
+                synthesis.put_samples(self._model, low, step, level, small)
+                return small
             columns, rows = self._grid.size
-            out = self._array("samples", 0, (rows, columns, self._fields["components"]), np.float32)
+            out = self._array("samples", 0, (rows, columns, components), np.float32)
             made = self._made["samples", 0]
             for part in list(made.lacking(window)):
                 for strip in _strips(part):
-                    out[strip.at] = self._coloured(self._finer(0, strip), 0)
+                    low = self._finer(0, strip)
+                    synthesis.put_samples(self._model, low, step, 0, out[strip.at])
                 made.add(part)
             if made.whole:
                 for key in [k for k in self._arrays if k[0] in ("latents", "plain", "bands")]:
@@ -219,8 +225,11 @@ class Decoding:
         place = self._place(level, whole)
         coder, self._coder = self._coder, None  # it is of no use after an error
         assert coder is not None, "the lowest planes are read"
-        out[:] = 0
+        if level in self._spoilt:
+            out[:] = 0
+        self._spoilt.add(level)
         coder.level(place, out)
+        self._spoilt.remove(level)
         if level == 1 or self._grid.tiles(level - 1, self._fields["tile"]):
             coder.finish(self._where)
         self._coder, self._read = coder, level
@@ -305,15 +314,6 @@ class Decoding:
         low = self._low(level + 1, above)[above.at]
         out = synthesis.finer(self._model, level + 1, low, high, self._fields["step"], under.shape)
         return out[window.inside(under)]
-
-    def _coloured(self, planes: Floats, level: int) -> Floats:
-        """Samples float32 [rows, columns, components] in 0..1 of planes."""
-        out = synthesis.colours(self._model, planes, self._fields["step"], level)
-        if self._fields["components"] == 1:
-            shape = (*out.shape[:2], 1)
-            out = np.mean(out, 2, keepdims=True, out=np.empty(shape, np.float32))
-        out /= 255
-        return np.clip(out, 0, 1, out=out)
 
 
 def _strips(window: Window) -> Iterator[Window]:

@@ -71,14 +71,20 @@ def finer(
     """
     weights = model.synthesis[min(level, len(model.synthesis)) - 1]
     t = np.float32((step - STEP_ORIGIN) / 128)
-    # In double precision, so that all machines round it to the same numbers.
-    gain = np.exp(weights.gain.floats + weights.gain_by_step.floats * t, dtype=np.float64)
-    gain = gain.astype(np.float32)
+    gain = _gains(weights, step)
     bias = weights.first_bias.floats + weights.first_by_step.floats * t
     linear = _linear(model, level).astype(np.float32)
     if kernel.available():
         return synthesis_native.finer(weights, linear, gain, bias, low, latents, shape)
     return _filtered(weights, linear, gain, bias, low, latents, shape)
+
+
+def _gains(weights: Synthesis, step: int) -> Floats:
+    """Gains [9] of latents."""
+    t = np.float32((step - STEP_ORIGIN) / 128)
+    # In double precision, so that all machines round it to the same numbers.
+    gain = np.exp(weights.gain.floats + weights.gain_by_step.floats * t, dtype=np.float64)
+    return gain.astype(np.float32)
 
 
 def _linear(model: Model, level: int) -> NDArray[np.float64]:
@@ -100,16 +106,42 @@ def colours(model: Model, planes: Floats, step: int, level: int = 0) -> Floats:
     Returns:
         float32 [h, w, 3] colours in 0..255, not clipped.
     """
-    matrix = model.to_colour.floats
-    for left_out in range(1, level + 1):
-        matrix = (matrix @ _evenly(model, left_out)).astype(np.float32)
-    matrix = matrix * np.float32(2 ** (step / 64))
+    matrix = _colour_matrix(model, step, level)
     if kernel.available():
         return kernel.coloured(np.ascontiguousarray(planes), matrix)
     out = np.empty_like(planes)
     for top, bottom in strips(*planes.shape[:2]):
         out[top:bottom] = planes[top:bottom] @ matrix.T + 128
     return out
+
+
+def put_samples(model: Model, planes: Floats, step: int, level: int, out: Floats) -> None:
+    """Puts the colours of planes, as samples in 0..1.
+
+    Args:
+        model: The registered model.
+        planes: float32 [h, w, 3] planes above a level.
+        step: Quantization step, as in PLAN.
+        level: Number of the levels below, as for `colours`.
+        out: float32 [h, w, 3], or [h, w, 1] for the mean of the components.
+    """
+    if kernel.available() and out.shape[2] == 3 and out.flags.c_contiguous:
+        kernel.shown(np.ascontiguousarray(planes), _colour_matrix(model, step, level), out)
+        return
+    found = colours(model, planes, step, level)
+    if out.shape[2] == 1:
+        found = found.mean(2, keepdims=True)
+    found /= 255
+    np.clip(found, 0, 1, out=out)
+
+
+def _colour_matrix(model: Model, step: int, level: int) -> Floats:
+    """Weights [3, 3] of planes above a level in each component."""
+    matrix = model.to_colour.floats
+    for left_out in range(1, level + 1):
+        matrix = (matrix @ _evenly(model, left_out)).astype(np.float32)
+    scaled: Floats = matrix * np.float32(2 ** (step / 64))
+    return scaled
 
 
 def _evenly(model: Model, level: int) -> NDArray[np.float64]:
@@ -133,10 +165,10 @@ def details(model: Model, latents: Sequence[Ints], step: int, size: tuple[int, i
         For each level the root mean square of what it adds, in 8-bit levels.
     """
     weight = np.square(model.to_colour.floats * 2 ** (step / 64)).mean(0)  # of each colour
-    t, out = (step - STEP_ORIGIN) / 128, []
+    out = []
     for level, found in enumerate(latents, 1):
         weights = model.synthesis[min(level, len(model.synthesis)) - 1]
-        gain = np.exp(weights.gain.floats + weights.gain_by_step.floats * t)
+        gain = _gains(weights, step).astype(np.float64)
         power = np.square(found.astype(np.float64)).sum((1, 2)) * gain**2
         total = float((power.reshape(3, 3).sum(1) * weight).sum())
         out.append(float(np.sqrt(total / (size[0] * size[1]))))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from proxyimg_codec.bench import peers, rd, rows, summary
-from proxyimg_codec.bench.measure import bd_rate, psnr
+from proxyimg_codec.bench.measure import bd_rate, psnr, ssimulacra2
 from proxyimg_codec.bench.rows import Row, read_csv
 from proxyimg_codec.io import raster
 from tests.support import codecs as fakes
@@ -238,7 +238,7 @@ def test_failures_leave_the_rest(tool, two, tmp_path, fake_codecs):
 
 def test_csv_round_trip(tmp_path):
     row = Row("a, \"b\"", "12ab", 3, 4, "jpeg", "4:2:0", "x 1", "cpu", 0.1, 5, 3.333333, 30.5,
-              float("nan"), 1e-5, 0.0)  # fmt: skip
+              float("nan"), 61.25, 1e-5, 0.0)  # fmt: skip
     path = tmp_path / "rd.csv"
     path.write_text(rows.to_csv([row, replace(row, ms_ssim=0.5)]) + "a,12ab,3,4,jp")
     first, second = read_csv(path)
@@ -247,10 +247,78 @@ def test_csv_round_trip(tmp_path):
     assert replace(first, ms_ssim=0.5) == second
 
 
+def test_ssimulacra2_is_measured_when_it_is_asked_for(tool, two, tmp_path, fake_codecs):
+    pytest.importorskip("ssimulacra2")
+    first, out = tmp_path / "first", tmp_path / "out"
+    words = ["bench", "rd", two, "--codecs", "plain,opaque"]
+    assert "SSIMULACRA" not in tool(*words, "--out", first).out.decode()
+    made = len(fake_codecs)
+    words += ["--perceptual", "--out", out]
+    text = tool(*words, "--reuse", first / "rd.csv").out.decode()
+    assert "BD-rate by SSIMULACRA 2" in text
+    assert len(fake_codecs) == 2 * made  # those without the score do not count
+    measured = [r for r in read_csv(out / "rd.csv") if (r.picture, r.codec) == ("a", "plain")]
+    scores = [r.ssimulacra2 for r in measured]
+    assert scores == sorted(scores)
+    assert scores[0] < scores[-1] < 100
+    assert (out / "ssimulacra2.svg").exists()
+    tool(*words, "--reuse", out / "rd.csv")
+    assert len(fake_codecs) == 2 * made
+
+
+def test_ssimulacra2_sees_alpha_and_small_pictures():
+    pytest.importorskip("ssimulacra2")
+    opaque = picture(1)
+    clear = np.dstack([opaque, np.full(opaque.shape[:2], 255, np.uint8)])
+    assert ssimulacra2(clear, clear) == ssimulacra2(opaque, opaque) == 100
+    faded = clear.copy()
+    faded[:20, :, 3] = 100
+    assert ssimulacra2(clear, faded) < 50
+    assert np.isnan(ssimulacra2(opaque[:7], opaque[:7]))
+
+
+def test_svt_codes_any_size():
+    pytest.importorskip("av")
+    codec = peers.codecs()["svt"]
+    # The encoder refuses sides below 64.
+    for width, height in ((141, 93), (64, 65)):
+        pixels = picture(3, width, height)
+        files = [codec.encode(pixels, q) for q in (codec.qualities[0], codec.qualities[-1])]
+        found = [psnr(pixels, codec.decode(data)) for data in files]
+        assert len(files[0]) < len(files[1])
+        assert found[0] < found[1]
+        assert found[1] > 24
+        assert codec.decode(files[0]).shape == pixels.shape
+    assert "PyAV" in codec.version()
+
+
+def test_avif_as_slow_as_our_codec_is_found(two, monkeypatch):
+    names = ["pxi", "avif444", *(f"avif444-s{n}" for n in peers.EQUAL_TIME)]
+    now = [0.0]
+    took = {"pxi": 5.0, "avif444": 1.0, "avif444-s3": 2.0, "avif444-s2": 4.0, "avif444-s1": 8.0}
+
+    def table(effort):
+        def codec(name):
+            def encode(pixels, quality):
+                now[0] += took[name]
+                return fakes.encode(pixels, quality)
+
+            return fake(name, encode=encode)
+
+        return {name: codec(name) for name in names}
+
+    monkeypatch.setattr(rd, "codecs", table)
+    monkeypatch.setattr(rd.time, "process_time", lambda: now[0])
+    source = rd.find(two)[0]
+    assert rd.as_slow(source, None).name == "avif444-s2"
+    took["pxi"] = 0.5
+    assert rd.as_slow(source, None).name == "avif444"
+
+
 def test_published_curves_are_drawn_for_kodak(tool, tmp_path, fake_codecs):
     source = folder_of(tmp_path / "in", **{f"kodim{i:02d}": picture(i) for i in range(1, 25)})
     text = tool("bench", "rd", source, "--codecs", "plain", "--out", tmp_path / "out").out.decode()
-    for name in ("VTM", "Cool-Chic", "C3", "COIN", "GaussianImage", "Ballé 2018"):
+    for name in ("VTM", "Cool-Chic", "ELIC", "C3", "COIN", "GaussianImage", "Ballé 2018"):
         assert f"| {name}" in text
         assert name in (tmp_path / "out" / "psnr.svg").read_text()
     vtm = next(line for line in text.splitlines() if line.startswith("| VTM"))

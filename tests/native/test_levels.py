@@ -9,6 +9,8 @@ import pytest
 
 from proxyimg_codec import from_bytes
 from proxyimg_codec.native import kernel, levels
+from proxyimg_codec.texture import planes, registered_model
+from proxyimg_codec.texture.latents import Latents
 from tests.support.paths import ROOT
 
 GOLDEN = ROOT / "tests" / "golden"
@@ -52,6 +54,53 @@ def test_all_levels_give_the_same_pixels(name, choose):
     for whole, small in found.values():
         assert zlib.crc32(whole.tobytes()) == PICTURES[name]
         np.testing.assert_array_equal(small, next(iter(found.values()))[1])
+
+
+def exaggerated(model, seed):
+    """A model whose context networks have int8 weights of all sizes, many of them the largest."""
+    rng = np.random.default_rng(seed)
+
+    def grown(name, array):
+        if array.values.ndim == 1:
+            return array
+        values = rng.integers(-128, 128, array.values.shape).astype(np.int32)
+        values[rng.random(values.shape) < 0.17] = 127
+        values[rng.random(values.shape) < 0.17] = -128
+        return array._replace(
+            values=values, exponent=array.exponent - (3 if name == "second" else 2)
+        )
+
+    contexts = [
+        c._replace(**{n: grown(n, getattr(c, n)) for n in c._fields if n != "first_by_step"})
+        for c in model.context
+    ]
+    return model._replace(context=tuple(contexts))
+
+
+@pytest.mark.skipif(levels.chosen().library is None, reason="the core was not compiled")
+def test_weights_of_all_sizes_give_the_same_bytes_and_latents(choose, monkeypatch):
+    model = exaggerated(registered_model.registered(2), 5)
+    monkeypatch.setattr(registered_model, "registered", lambda number: model)
+    rng = np.random.default_rng(6)
+    shapes = [(37, 45), (19, 23), (10, 12)]
+    coarse = rng.integers(-3000, 3000, (3, 10, 12)).astype(np.int32)
+    few = [
+        (rng.laplace(0, 2, (9, h, w)) * (rng.random((h, w)) < 0.4)).astype(np.int32)
+        for h, w in shapes
+    ]
+    latents = Latents(tuple(few), coarse)
+
+    found = {}
+    for level in (*levels.LEVELS, levels.NUMPY):
+        if choose(level).level == level:
+            packed = planes.encoded(latents, (90, 74), 300, tile=0).packed
+            found[level] = packed, planes.Planes(packed).latents.levels
+    assert len(found) > 1
+    expected, kept = found[levels.NUMPY]  # latents that are certain to be 0 are not kept
+    for packed, decoded in found.values():
+        assert packed == expected
+        for a, b in zip(decoded, kept, strict=True):
+            np.testing.assert_array_equal(a, b)
 
 
 def test_a_level_that_is_not_there_means_numpy_and_a_reason(choose):

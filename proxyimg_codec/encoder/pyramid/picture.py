@@ -24,7 +24,7 @@ from ..completion.hidden import copies_of
 from ..completion.membrane import continued, continued_from
 from ..settings import Settings
 from ..shapes.coverage import coverage_of
-from ..shapes.layers import Plan
+from ..shapes.layers import Plan, alike
 from .encode import CELL, EFFORTS, Effort, Raster, encode
 from .matte import Soft, soft_rasters
 
@@ -53,6 +53,10 @@ class Interrupts:
     seen: bool = False
 
 
+SURE = 0.5
+"""Least coverage at which alpha is taken from the pixel; it continues beyond."""
+
+
 def encode_picture(
     picture: Floats, plan: Plan, settings: Settings, report: Report, behind: Source | None = None
 ) -> Picture:
@@ -77,8 +81,10 @@ def encode_picture(
     height, width = picture.shape[:2]
     boundaries = [v.boundary for v in plan.layers]
     views, softs = list[View](), dict[int, Soft]()
+    clear = np.ones((height, width), np.float32)
     for k, layer in enumerate(plan.layers):
         covered = coverage_of(layer.boundary, width, height).reshape(height, width)
+        clear *= 1 - covered
         box, cuts = _view(boundaries, k, covered)
         if layer.alpha is not None and cuts is not None:
             found = soft_rasters(picture[..., :3], layer.alpha, covered, cuts)
@@ -86,7 +92,7 @@ def encode_picture(
         views.append((box, replace(cuts, unmix=False) if cuts and k in softs else cuts))
     rasters = [colour_of(picture)._replace(structural=settings.tune == "ms-ssim")]
     if plan.channels == 4:
-        rasters.append(alpha_of(picture[..., 3]))
+        rasters.append(alpha_of(within(picture[..., 3], 1 - clear, alike(settings))))
     shared = len(rasters)
     own = [] if behind is None else _behind(rasters, views[0][1], behind)
     rasters += own
@@ -268,6 +274,21 @@ def colour_of(picture: Floats) -> Raster:
 def alpha_of(alpha: Floats) -> Raster:
     """Makes a grey raster of alpha, float32 [H, W] in 0..1."""
     return Raster(np.repeat(alpha[..., None] * np.float32(255), 3, 2), None, None, True)
+
+
+def within(alpha: Floats, share: Floats, same: float) -> Floats:
+    """Alpha that is `alpha` again, float32 [H, W], when layers are also cut by their outlines.
+
+    Args:
+        alpha: float32 [H, W] in 0..1, that of the picture.
+        share: float32 [H, W] in 0..1, coverage of the outlines together.
+        same: Difference of both up to which outlines alone show alpha.
+    """
+    sure = share >= SURE
+    inside = np.where(sure, np.minimum(alpha / np.maximum(share, SURE), 1), 0)
+    inside[sure & (share < 1) & (np.abs(alpha - share) < same)] = 1
+    around = continued(inside[..., None].astype(np.float32), np.where(sure, share, 0))
+    return np.where(sure, inside, around[..., 0]).astype(np.float32)
 
 
 def _behind(rasters: Sequence[Raster], cuts: Occlusion | None, source: Source) -> list[Raster]:

@@ -4,23 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-import numpy as np
-
 from ...geometry.boundary import Boundary
 from ...limits import DEFAULT_LIMITS
 from ...model import Layer, Layers, Picture
 from ...texture.network import Floats
 from ...texture.planes import Planes
 from ...texture.pyramid import PyramidTexture
-from ..completion.membrane import continued
 from ..settings import Settings
 from ..shapes.coverage import coverage_of
-from ..shapes.layers import LayerPlan
+from ..shapes.layers import LayerPlan, alike
 from .encode import Raster
-from .picture import Box, Report, alpha_of, colour_of, encode_rasters
-
-SURE = 0.5
-"""Least coverage at which alpha is taken from the pixel; it continues beyond."""
+from .picture import Box, Report, alpha_of, colour_of, encode_rasters, within
 
 ROOM = 2
 """Samples beyond the bounds of a boundary that take part in interpolation."""
@@ -62,7 +56,9 @@ def encode_stack(
         pixels = pixels_of(number, box)
         rasters.append(colour_of(pixels)._replace(structural=settings.tune == "ms-ssim"))
         if channels == 4:
-            rasters.append(alpha_of(_within(pixels[..., 3], plan.boundary, box, size)))
+            x, y, w, h = box
+            share = coverage_of(plan.boundary, *size).reshape(size[::-1])[y : y + h, x : x + w]
+            rasters.append(alpha_of(within(pixels[..., 3], share, alike(settings))))
 
     def picture_of(sources: Sequence[Planes]) -> Picture:
         given = iter(sources)
@@ -76,15 +72,6 @@ def encode_stack(
         return finished(Picture(*size, most, False, 8, Layers(layers), ()))
 
     return encode_rasters(rasters, picture_of, original, settings, report)
-
-
-def _within(alpha: Floats, boundary: Boundary | None, box: Box, size: tuple[int, int]) -> Floats:
-    """Alpha that is `alpha` again, float32 [h, w], when it is multiplied by the coverage."""
-    x, y, w, h = box
-    share = coverage_of(boundary, *size).reshape(size[::-1])[y : y + h, x : x + w]
-    inside = np.where(share >= SURE, np.minimum(alpha / np.maximum(share, SURE), 1), 0)
-    around = continued(inside[..., None].astype(np.float32), np.where(share >= SURE, share, 0))
-    return np.where(share >= SURE, inside, around[..., 0]).astype(np.float32)
 
 
 def box_of(boundary: Boundary | None, size: tuple[int, int]) -> Box:

@@ -44,12 +44,12 @@ FINE_TOLERANCE: dict[str, dict[str, float]] = {"lsq": {"tolerance": 1.2}, "chamf
 SEEN = 0.4
 """Squared error of colours over black and white for that of alpha, roughly."""
 
-TOLERABLE = {3: 0.8, 4: 0.3}
-"""Error that an outline may cause, as a share of that of the coding, by the channels of a layer: a
-crisp outline is worth something, where alpha is stored anyway it is worth less."""
+TOLERABLE = {False: 0.8, True: 0.3}
+"""Error that outlines may cause, as a share of that of the coding, by whether textures have alpha:
+a crisp outline is worth something, where alpha is stored anyway it is worth less."""
 
 AROUND = 2
-"""Pixels by which an outline keeps off, if alpha shows the details."""
+"""Pixels by which an outline keeps off where alpha shows the details."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,27 +122,48 @@ def plan_layers(picture: Floats, settings: Settings, masks: Sequence[Region] | N
         regions = resolve(matted(masks, picture, settings, opaque), height, width, support)
     else:
         regions = matted(_found(picture, settings, support), picture, settings, opaque)
-    outline = alpha if not opaque and not soft and height * width <= FINE_PIXELS else None
     check_count(len(regions), "layers, with what no mask covers,")
-    # The planes hold one alpha per sample, which overlapping layers would apply twice.
-    overlap = 0 if soft and settings.pyramid else OVERLAP
+    boundaries = _outlines(regions, alpha, soft, settings)
+    if settings.pyramid and not opaque and _too_coarse(boundaries, alpha, soft, settings):
+        soft, regions = True, _with_room(regions, alpha)
+        boundaries = _outlines(regions, alpha, soft, settings)
+    layers = tuple(
+        LayerPlan(region.name, boundary, parent=region.parent, alpha=region.alpha)
+        for region, boundary in zip(regions, boundaries, strict=True)
+    )
+    return Plan(layers, 4 if soft else 3, opaque, groups_of(regions))
+
+
+def _outlines(
+    regions: Sequence[Region], alpha: Floats, soft: bool, settings: Settings
+) -> list[Boundary | None]:
+    """Boundaries of regions; None for the back of an opaque picture.
+
+    Args:
+        regions: Regions, back to front, with masks bool [H, W].
+        alpha: float32 [H, W] in 0..1, that of the picture.
+        soft: Whether textures have alpha, which then shows the details.
+        settings: Settings of the encoder.
+    """
+    opaque = bool((alpha == 1).all())
+    outline = alpha if not opaque and not soft and alpha.size <= FINE_PIXELS else None
     solid = None if opaque and settings.pyramid else alpha >= 0.97
-    layers: list[LayerPlan] = []
-    front = np.zeros((height, width), bool)
+    found: list[Boundary | None] = []
+    front = np.zeros(alpha.shape, bool)
     for k, region in reversed(list(enumerate(regions))):
         boundary = None
         if not opaque or k > 0:
-            mask = _continued(region.mask, front, overlap, solid)
+            mask = _continued(region.mask, front, soft and settings.pyramid, solid)
             boundary = _boundary(mask, outline, settings)
-        layers.insert(0, LayerPlan(region.name, boundary, parent=region.parent, alpha=region.alpha))
+        found.insert(0, boundary)
         front |= region.mask
-    return Plan(tuple(layers), 4 if soft else 3, opaque, groups_of(regions))
+    return found
 
 
 def _continued(
     mask: NDArray[np.bool_],
     front: NDArray[np.bool_],
-    overlap: int,
+    soft: bool,
     solid: NDArray[np.bool_] | None,
 ) -> NDArray[np.bool_]:
     """Mask of a layer as its boundary has it: with what may be, and what must be, hidden of it.
@@ -150,13 +171,15 @@ def _continued(
     Args:
         mask: bool [H, W], the mask of the layer.
         front: bool [H, W], the masks of all in front of it.
-        overlap: Pixels by which it continues at least under those that it touches.
+        soft: Whether planes have alpha: what is translucent in them must not lie in two layers.
         solid: bool [H, W], pixels that let nothing through. Hidden parts keep away from others, and
             from outlines of layers in front with nothing of this layer beyond, where the coverage
             of both would add up. None for planes of an opaque picture, where neither matters.
     """
     seen, hidden = mask & ~front, mask & front
-    more = _dilate(seen, overlap) & front
+    more = _dilate(seen, OVERLAP) & front
+    if soft and solid is not None:
+        more &= solid
     if hidden.any():
         # The layer goes on by itself where its outline crosses another.
         beyond = more & ~hidden
@@ -226,32 +249,43 @@ def _boundary(mask: NDArray[np.bool_], outline: Floats | None, settings: Setting
     )
 
 
-def with_room(plan: Plan, alpha: Floats, settings: Settings) -> Plan:
-    """Leaves the shape of a layer to its alpha if the outline is too coarse for the quality.
+def _too_coarse(
+    boundaries: Sequence[Boundary | None], alpha: Floats, soft: bool, settings: Settings
+) -> bool:
+    """Whether outlines show alpha, float32 [H, W] in 0..1, worse than the quality allows.
 
-    Outlines miss thin details and the width of soft rims. The squared error of coding, in levels of
-    8 bits, is about step**1.5 / 10 (measured on sprites at qualities from 36 to 68).
-
-    Args:
-        plan: Plan of one layer, in the coordinates of `alpha`.
-        alpha: float32 [H, W] in 0..1, that of the layer.
-        settings: Settings of the encoder.
-
-    Returns:
-        The plan, or one whose texture has alpha, and whose outline keeps off from all that shows.
+    If textures have alpha, which `soft` tells, that takes away what is too much. Outlines miss thin
+    details and the width of soft rims. The squared error of coding, in levels of 8 bits, is about
+    step**1.5 / 10 (measured on sprites at qualities from 36 to 68).
     """
-    boundary = plan.layers[0].boundary
-    if boundary is None:
-        return plan
     height, width = alpha.shape
-    missed = alpha - coverage_of(boundary, width, height).reshape(height, width)
-    if plan.channels == 4:  # then alpha takes away what is too much
-        missed = np.maximum(missed, 0)
-    error = SEEN * 255**2 * float((missed**2).mean())
-    if error <= TOLERABLE[plan.channels] * 2 ** (1.5 * settings.step / 64) / 10:
-        return plan
-    around = _boundary(_dilate(alpha > 0.02, AROUND), None, settings)
-    return replace(plan, layers=(replace(plan.layers[0], boundary=around),), channels=4)
+    clear = np.ones(alpha.shape, np.float32)
+    for boundary in boundaries:
+        clear *= 1 - coverage_of(boundary, width, height).reshape(height, width)
+    missed = alpha + clear - 1
+    error = SEEN * 255**2 * float(((np.maximum(missed, 0) if soft else missed) ** 2).mean())
+    return error > TOLERABLE[soft] * 2 ** (1.5 * settings.step / 64) / 10
+
+
+def alike(settings: Settings) -> float:
+    """Difference between alpha and coverage, 0..1, that coding hides: a quantization step."""
+    return float(2 ** (settings.step / 64) / 255)
+
+
+def _with_room(regions: Sequence[Region], alpha: Floats) -> list[Region]:
+    """Regions whose masks keep off from all that alpha, float32 [H, W] in 0..1, shows."""
+    covered = np.logical_or.reduce([r.mask for r in regions])
+    room = _dilate(alpha > 0.02, AROUND) & ~covered
+    # What is around goes to the nearest region, and of those there to the one in front.
+    front = np.zeros(alpha.shape, np.int32)
+    for k, region in enumerate(regions):
+        front[region.mask] = k
+    _, nearest = cv2.distanceTransformWithLabels(
+        (~covered).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    owner = np.zeros(int(nearest.max()) + 1, np.int32)
+    owner[nearest[covered]] = front[covered]
+    return [replace(r, mask=r.mask | (room & (owner[nearest] == k))) for k, r in enumerate(regions)]
 
 
 def _eroded(mask: NDArray[np.bool_], radius: int) -> NDArray[np.bool_]:
