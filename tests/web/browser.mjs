@@ -56,6 +56,22 @@ const actions = {
     await touch("touchMove", to);
     await touch("touchEnd", []);
   },
+  async element([bytes, attributes]) {
+    saved = await page.evaluate(async ([text, given]) => {
+      await import(new URL("pxi-wasm/element.js", location.href));
+      const element = document.createElement("pxi-image");
+      const content = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+      const src = URL.createObjectURL(new Blob([content]));
+      for (const [key, value] of Object.entries({ src, ...given })) element.setAttribute(key, value);
+      const done = new Promise((resolve, reject) => {
+        element.addEventListener("load", resolve);
+        element.addEventListener("error", ({ message }) => reject(new Error(message)));
+      });
+      document.body.append(element);
+      await done;
+      return element.shadowRoot.querySelector("canvas").toDataURL().split(",")[1];
+    }, [readFileSync(bytes).toString("base64"), attributes]);
+  },
   async save() {
     const [download] = await Promise.all([page.waitForEvent("download"), page.click("#save")]);
     saved = readFileSync(await download.path()).toString("base64");

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import proxyimg_codec as pxi
 from conformance.cases import find
 from proxyimg_codec.cli import decode
 from proxyimg_codec.io import raster
@@ -173,3 +174,16 @@ def test_fingers_keys_and_saving(address: str, tmp_path: Path) -> None:
     picture = raster.read(tmp_path / "saved.png").pixels.astype(float)
     wanted = expected(name, saved, tmp_path)[..., : picture.shape[2]]
     assert np.abs(picture - wanted).max() <= 1
+
+
+@needs_browser
+def test_element(address: str, tmp_path: Path) -> None:
+    source = str(find("moves-loop").input)
+    attributes = {"style": "width: 20px", "time": "0.25", "layers": "0,-1"}
+    # The page waits for a file of its own before it is asked what it shows.
+    _, shown = browse(address, ("drop", source), ("element", [source, attributes]))
+    (tmp_path / "element.png").write_bytes(base64.b64decode(shown["saved"]))
+    picture = raster.read(tmp_path / "element.png").pixels
+    expected = pxi.open(source).render(width=20, t=0.25, layers=[0, -1])
+    assert picture.shape[:2] == expected.shape[:2]
+    assert np.abs(picture[..., :3] - expected[..., :3].astype(float)).max() <= 1
