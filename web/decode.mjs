@@ -2,18 +2,19 @@
 /**
  * Decodes a .pxi file to PNG under Node: `node web/decode.mjs IN.pxi OUT.png [flags]`.
  *
- * Flags and exit codes are those of conformance/README.md, and those of `pxi-decode`.
+ * Flags and exit codes are those of conformance/README.md, and those of `pxi-decode`. `--wasm` takes the decoder
+ * of pxi-wasm/; `--latents` is of the plain one.
  */
 
 import { createHash } from "node:crypto";
 import { readFileSync, rmSync, writeFileSync } from "node:fs";
 import { createInterface } from "node:readline";
 import { parseArgs } from "node:util";
-import { encodePng } from "./png.mjs";
-import { Image, MODEL_FILES, PxiError, render } from "./pxi/index.js";
+import { encodePng } from "./png.js";
+import { MODEL_FILES, PxiError } from "./pxi/index.js";
 
 const USAGE = `usage: node web/decode.mjs IN.pxi OUT.png [--width N] [--height N] [--scale S]
-         [--region X,Y,W,H] [--time S] [--layer NAME|INDEX].. [--no-background] [--bit-depth 8|16]
+         [--region X,Y,W,H] [--time S] [--layer NAME|INDEX].. [--no-background] [--bit-depth 8|16] [--wasm]
        node web/decode.mjs --latents IN.pxi
        node web/decode.mjs --batch`;
 const EXIT = { usage: 2, io: 3, invalid: 4, unsupported: 5, limit: 6 };
@@ -21,7 +22,7 @@ const OPTIONS = {
   width: { type: "string" }, height: { type: "string" }, scale: { type: "string" },
   region: { type: "string" }, time: { type: "string" }, "bit-depth": { type: "string" },
   layer: { type: "string", multiple: true }, "no-background": { type: "boolean" },
-  latents: { type: "boolean" }, batch: { type: "boolean" },
+  wasm: { type: "boolean" }, latents: { type: "boolean" }, batch: { type: "boolean" },
 };
 
 class UsageError extends Error {}
@@ -66,12 +67,14 @@ async function run(words) {
     const bits = flags["bit-depth"] ?? "8";
     if (!["8", "16"].includes(bits)) throw new UsageError("--bit-depth must be 8 or 16");
     const bytes = new Uint8Array(readFileSync(positionals[0]));
+    const { Image, render } = await import(flags.wasm && !flags.latents ? "./pxi-wasm/index.js" : "./pxi/index.js");
     const image = await Image.open(bytes, async (model) => readFileSync(MODEL_FILES[model]));
+    if (image.plain) throw new UsageError("WebAssembly is not there: make -C libpxi/wasm");
     if (flags.latents) {
       console.log(digest(image));
       return 0;
     }
-    const png = encodePng(render(image, view(flags)), Number(bits));
+    const png = await encodePng(render(image, { ...view(flags), dtype: `uint${bits}` }));
     output = positionals[1];
     writeFileSync(output, png);
     return 0;

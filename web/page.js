@@ -1,46 +1,20 @@
-/** The viewer: drop a file, zoom with the wheel, drag to pan, hide layers, play motion. */
+/** The viewer: drop a file, zoom and move it with mouse, fingers or keys, hide layers, play motion, save. */
 
-import { fit, panned, placed, visible, zoomed } from "./viewport.js";
+import { listen } from "./gestures.js";
+import { Picture } from "./pxi-wasm/beside.js";
+import { fit, placed, visible } from "./viewport.js";
 
 const $ = (id) => document.getElementById(id);
+const COARSE = 1 / 8; // detail of the first picture of a file
 const DRAFT = 1 / 3; // detail while something moves and pictures are slow
 const SLOW = 60; // milliseconds
 const CALM = 150; // milliseconds after which the full picture is made
 
-/** Calls to the worker, by number. */
-class Decoder {
-  #worker = new Worker(new URL("worker.js", import.meta.url), { type: "module" });
-  #waiting = new Map();
-  #last = 0;
-
-  constructor() {
-    this.#worker.onmessage = ({ data: { id, error, kind, ...answer } }) => {
-      const { resolve, reject } = this.#waiting.get(id);
-      this.#waiting.delete(id);
-      if (error === undefined) resolve(answer);
-      else reject(new Error(`${kind}: ${error}`));
-    };
-    this.#worker.onerror = ({ message }) => this.end(message);
-  }
-
-  /** Stops whatever it does. */
-  end(reason = "stopped") {
-    this.#worker.terminate();
-    for (const { reject } of this.#waiting.values()) reject(new Error(reason));
-    this.#waiting.clear();
-  }
-
-  ask(task, request) {
-    const id = ++this.#last;
-    this.#worker.postMessage({ id, task, ...request });
-    return new Promise((resolve, reject) => this.#waiting.set(id, { resolve, reject }));
-  }
-}
-
-let decoder = new Decoder();
+let opening = null; // controller of the file that is read
 const canvas = $("screen");
 const state = {
-  picture: null, // {width, height, layers, duration}
+  name: "",
+  picture: null, // beside.js
   view: null,
   drawn: [], // numbers of layers
   time: null, // seconds, null for the still
@@ -52,6 +26,8 @@ const state = {
   touched: 0, // when something moved last
 };
 
+/** Of the motion, in seconds. */
+const duration = () => (state.picture.motion?.duration ?? 0) / 1000;
 const screen = () => ({ width: canvas.clientWidth, height: canvas.clientHeight });
 
 /** Draws what there is at once, and asks for what there should be. */
@@ -82,44 +58,51 @@ async function refresh() {
   while (state.stale && state.picture) {
     state.stale = false;
     const calm = !state.playing && performance.now() - state.touched > CALM;
-    const draft = !calm && state.cost > SLOW;
-    if (draft && !state.playing) setTimeout(() => update(false), CALM + 20);
     const { picture, drawn, time } = state;
-    const detail = devicePixelRatio * (draft ? DRAFT : 1);
-    const wanted = visible(state.view, picture, screen(), detail);
+    const coarse = !state.shown;
+    const draft = coarse || (!calm && state.cost > SLOW);
+    if (draft && !coarse && !state.playing) setTimeout(() => update(false), CALM + 20);
+    const wanted = visible(state.view, picture, screen(), devicePixelRatio * (coarse ? COARSE : draft ? DRAFT : 1));
     if (!wanted) break;
+    if (!drawn.length) {
+      state.shown = null;
+      break;
+    }
     const started = performance.now();
     try {
-      const answer = await decoder.ask("render", { ...wanted, layers: drawn, t: time });
-      const data = new ImageData(answer.pixels, answer.width, answer.height);
+      const bitmap = await picture.bitmap({ ...wanted, layers: drawn, t: time });
       if (state.picture !== picture) continue;
-      state.shown = { bitmap: await createImageBitmap(data), region: wanted.region, draft };
+      state.shown = { bitmap, region: wanted.region, draft };
+      state.stale ||= coarse;
       if (!draft) state.cost = performance.now() - started;
       $("status").textContent = `${picture.width} × ${picture.height}, ` +
         `${Math.round(state.view.scale * 100)} %, ${Math.round(performance.now() - started)} ms`;
       document.body.dataset.request = JSON.stringify(wanted);
     } catch (error) {
-      $("status").textContent = error.message;
+      if (state.picture === picture) $("status").textContent = error.message;
     }
     paint();
   }
+  paint();
   state.busy = false;
   document.body.dataset.idle = !state.playing && !state.shown?.draft;
 }
 
-async function open(name, bytes) {
+/** Shows a file: its address or its content. */
+async function open(name, source) {
   $("error").textContent = "";
-  decoder.end();
-  decoder = new Decoder();
+  opening?.abort();
+  opening = new AbortController();
+  const { signal } = opening;
+  state.picture?.close();
+  Object.assign(state, { name, picture: null, shown: null, time: null, playing: false, cost: 0 });
   try {
-    const picture = await decoder.ask("open", { bytes });
-    Object.assign(state, { picture, shown: null, time: null, playing: false, cost: 0 });
+    state.picture = await Picture.open(source, { signal });
   } catch (error) {
-    state.picture = null;
-    state.shown = null;
+    if (signal.aborted) return;
     $("hint").hidden = false;
     $("panel").hidden = true;
-    $("error").textContent = error.message;
+    $("error").textContent = error.kind ? `${error.kind}: ${error.message}` : error.message;
     paint();
     return;
   }
@@ -128,16 +111,16 @@ async function open(name, bytes) {
   $("name").textContent = name;
   state.view = fit(state.picture, screen());
   listLayers();
-  $("motion").hidden = !state.picture.duration;
+  $("motion").hidden = !state.picture.motion;
   $("play").textContent = "Play";
-  $("time").max = state.picture.duration;
+  $("time").max = duration();
   $("time").value = 0;
   update(false);
 }
 
 /** Front to back, as one looks at them. */
 function listLayers() {
-  const { layers } = state.picture;
+  const layers = state.picture.names;
   state.drawn = layers.flatMap(({ hidden }, k) => (hidden ? [] : [k]));
   const rows = layers.map(({ name, hidden }, k) => {
     const box = Object.assign(document.createElement("input"), { type: "checkbox", checked: !hidden });
@@ -159,7 +142,7 @@ function play() {
   const { picture } = state;
   const tick = () => {
     if (!state.playing || state.picture !== picture) return;
-    $("time").value = ((performance.now() - began) / 1000) % picture.duration;
+    $("time").value = ((performance.now() - began) / 1000) % duration();
     state.time = Number($("time").value);
     update(true);
     requestAnimationFrame(tick);
@@ -168,24 +151,43 @@ function play() {
   else update(false);
 }
 
-canvas.addEventListener("wheel", (event) => {
-  event.preventDefault();
-  if (!state.picture) return;
-  const lines = event.deltaMode === 1 ? 16 : 1;
-  const factor = Math.exp(-event.deltaY * lines * 0.002);
-  state.view = zoomed(state.view, factor, event.offsetX, event.offsetY, state.picture);
-  update(true);
-}, { passive: false });
-canvas.addEventListener("pointerdown", (event) => canvas.setPointerCapture(event.pointerId));
-canvas.addEventListener("pointermove", (event) => {
-  if (!state.picture || !event.buttons) return;
-  state.view = panned(state.view, event.movementX, event.movementY);
-  update(true);
-});
-canvas.addEventListener("dblclick", () => {
+/** Shows the whole picture. */
+function showAll() {
   if (!state.picture) return;
   state.view = fit(state.picture, screen());
   update(false);
+}
+
+/** Saves what is shown as PNG, with the colours of the picture. */
+async function save() {
+  const { name, picture, view, drawn, time } = state;
+  const wanted = picture && drawn.length && visible(view, picture, screen(), devicePixelRatio);
+  if (!wanted) return;
+  try {
+    const png = await picture.png({ ...wanted, layers: drawn, t: time });
+    const href = URL.createObjectURL(new Blob([png], { type: "image/png" }));
+    Object.assign(document.createElement("a"), { href, download: name.replace(/(\.pxi)?$/i, ".png") }).click();
+    setTimeout(() => URL.revokeObjectURL(href), 60000);
+  } catch (error) {
+    $("status").textContent = error.message;
+  }
+}
+
+listen(canvas, {
+  view: () => state.picture && state.view,
+  picture: () => state.picture,
+  move(view) {
+    state.view = view;
+    update(true);
+  },
+});
+canvas.addEventListener("dblclick", showAll);
+addEventListener("keydown", (event) => {
+  const keys = { 0: showAll, s: save, " ": () => state.picture?.motion && play() };
+  const taken = event.ctrlKey || event.metaKey || event.altKey || event.target.closest?.("input, button");
+  if (taken || !Object.hasOwn(keys, event.key)) return;
+  event.preventDefault();
+  keys[event.key]();
 });
 addEventListener("resize", () => state.picture && update(false));
 addEventListener("dragover", (event) => {
@@ -197,12 +199,13 @@ addEventListener("drop", async (event) => {
   event.preventDefault();
   document.body.classList.remove("over");
   const [file] = event.dataTransfer.files;
-  if (file) await open(file.name, await file.arrayBuffer());
+  if (file) await open(file.name, file);
 });
 $("file").onchange = async ({ target: { files: [file] } }) => {
-  if (file) await open(file.name, await file.arrayBuffer());
+  if (file) await open(file.name, file);
 };
 $("play").onclick = play;
+$("save").onclick = save;
 $("time").oninput = () => {
   state.time = Number($("time").value);
   state.playing = false;
@@ -212,8 +215,4 @@ $("time").oninput = () => {
 
 // ?file=URL shows a file from the start.
 const address = new URLSearchParams(location.search).get("file");
-if (address) {
-  const answer = await fetch(address);
-  if (answer.ok) await open(address.split("/").pop(), await answer.arrayBuffer());
-  else $("error").textContent = `${address}: ${answer.status}`;
-}
+if (address) await open(address.split("/").pop(), new URL(address, document.baseURI));

@@ -29,17 +29,17 @@ struct Failure {
 };
 
 // Throws; without exceptions (WebAssembly) it calls `pxi_failed` of the host, which never returns.
-[[noreturn]] void fail(Kind kind, const char *rule, std::string message, Place at = {});
+[[noreturn]] void fail(Kind kind, const char *rule, std::string message, const Place &at = {});
 
 // Throws as `new` does; ends the instance without exceptions.
 [[noreturn]] void out_of_memory();
 
 // Refuses the file as invalid unless `ok`.
-inline void need(bool ok, const char *rule, const char *message, Place at = {}) {
+inline void need(bool ok, const char *rule, const char *message, const Place &at = {}) {
     if (!ok) [[unlikely]]
         fail(Kind::INVALID, rule, message, at);
 }
-inline void supported(bool ok, const char *rule, const char *message, Place at = {}) {
+inline void supported(bool ok, const char *rule, const char *message, const Place &at = {}) {
     if (!ok) [[unlikely]]
         fail(Kind::UNSUPPORTED, rule, message, at);
 }

@@ -4,6 +4,7 @@
 #include <functional>
 
 #ifdef PXI_NO_THREADS
+#define PXI_THREAD_LOCAL
 namespace pxi {
 struct Mutex {};
 struct Lock {
@@ -12,6 +13,7 @@ struct Lock {
 }  // namespace pxi
 #else
 #include <mutex>
+#define PXI_THREAD_LOCAL thread_local
 namespace pxi {
 typedef std::mutex Mutex;
 typedef std::lock_guard<std::mutex> Lock;

@@ -41,7 +41,7 @@ Raster::Planes Raster::finer(int level, const Inputs &from, Window window, Windo
     const Synthetic &w = weights.synthesis_of(level + 1);
     const float t = (float)(plan.step - STEP_ORIGIN) / 128;
     std::vector<float> gain(9), bias = w.first_bias;
-    Planes out = std::make_unique_for_overwrite<float[]>(3 * under->shape().size());
+    Planes out(new float[3 * under->shape().size()]);
     for (int k = 0; k < 9; k++) gain[k] = (float)std::exp((double)(w.gain[k] + w.gain_by_step[k] * t));
     for (size_t i = 0; i < bias.size(); i++) bias[i] += w.first_by_step[i] * t;
     const Listening listening(watch);

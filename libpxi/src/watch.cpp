@@ -1,8 +1,10 @@
 #include "watch.h"
 
+#include "parallel.h"
+
 namespace pxi {
 
-static thread_local const Watch *heard = nullptr;
+static PXI_THREAD_LOCAL const Watch *heard = nullptr;
 
 Listening::Listening(const Watch &watch) : before(heard) { heard = &watch; }
 Listening::~Listening() { heard = before; }

@@ -11,6 +11,8 @@
 
 #if defined(__SSE2__)
 #include <immintrin.h>
+#elif defined(__wasm_simd128__)
+#include <wasm_simd128.h>
 #endif
 
 namespace PXI_LEVEL {
@@ -29,6 +31,8 @@ struct Whole {
         return sum + (ints)_mm256_madd_epi16(_mm256_set1_epi32(inputs), (__m256i)weights);
 #elif defined(__SSE2__) && !defined(__AVX__)
         return sum + (ints)_mm_madd_epi16(_mm_set1_epi32(inputs), (__m128i)weights);
+#elif defined(__wasm_simd128__)
+        return sum + (ints)wasm_i32x4_dot_i16x8(wasm_i32x4_splat(inputs), (v128_t)weights);
 #else
         return sum + (weights << 16 >> 16) * (int32_t)(int16_t)inputs + (weights >> 16) * (inputs >> 16);
 #endif

@@ -2,7 +2,7 @@
  * Drives web/index.html in a headless browser: `node browser.mjs ADDRESS STEPS`.
  *
  * STEPS is a JSON array of [name, argument]; prints a JSON array with what the page shows after
- * each: {request, status, error, layers, width, height, pixels}, pixels being RGBA in base64.
+ * each: {request, status, error, layers, width, height, pixels, saved}, pixels being RGBA in base64.
  */
 
 import { readFileSync } from "node:fs";
@@ -20,6 +20,8 @@ const page = await browser.newPage({ viewport: { width: 640 + 252, height: 480 }
 const problems = [];
 page.on("pageerror", (error) => problems.push(String(error)));
 page.on("console", (m) => m.type() === "error" && problems.push(m.text()));
+
+let saved = null; // the file that was downloaded last, in base64
 
 const actions = {
   async drop(path) {
@@ -41,6 +43,38 @@ const actions = {
     await page.mouse.down();
     await page.mouse.move(x + dx, y + dy);
     await page.mouse.up();
+  },
+  async key(name) {
+    await page.keyboard.press(name);
+  },
+  async pinch([from, to]) {
+    const session = await page.context().newCDPSession(page);
+    const touch = (type, places) => session.send("Input.dispatchTouchEvent", {
+      type, touchPoints: places.map(([x, y], id) => ({ x, y, id })),
+    });
+    await touch("touchStart", from);
+    await touch("touchMove", to);
+    await touch("touchEnd", []);
+  },
+  async element([bytes, attributes]) {
+    saved = await page.evaluate(async ([text, given]) => {
+      await import(new URL("pxi-wasm/element.js", location.href));
+      const element = document.createElement("pxi-image");
+      const content = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+      const src = URL.createObjectURL(new Blob([content]));
+      for (const [key, value] of Object.entries({ src, ...given })) element.setAttribute(key, value);
+      const done = new Promise((resolve, reject) => {
+        element.addEventListener("load", resolve);
+        element.addEventListener("error", ({ message }) => reject(new Error(message)));
+      });
+      document.body.append(element);
+      await done;
+      return element.shadowRoot.querySelector("canvas").toDataURL().split(",")[1];
+    }, [readFileSync(bytes).toString("base64"), attributes]);
+  },
+  async save() {
+    const [download] = await Promise.all([page.waitForEvent("download"), page.click("#save")]);
+    saved = readFileSync(await download.path()).toString("base64");
   },
   async toggle(layer) {
     await page.getByLabel(layer, { exact: true }).click();
@@ -83,7 +117,7 @@ await page.goto(address);
 const found = [];
 for (const [name, argument] of JSON.parse(steps)) {
   await actions[name](argument);
-  found.push(await shown());
+  found.push({ ...(await shown()), saved });
 }
 await browser.close();
 console.log(JSON.stringify({ found, problems }));

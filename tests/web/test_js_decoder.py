@@ -1,4 +1,4 @@
-"""The JavaScript decoder passes the conformance suite."""
+"""The JavaScript decoder passes the conformance suite, and so does libpxi as WebAssembly."""
 
 import json
 import queue
@@ -60,7 +60,7 @@ def batches() -> Iterator["queue.Queue[Batch]"]:
         batch.end()
 
 
-def test_suite(batches: "queue.Queue[Batch]") -> None:
+def judged(batches: "queue.Queue[Batch]", more: list[str]) -> None:
     def ask(words: Sequence[str]) -> Ended:
         batch = batches.get()
         try:
@@ -71,9 +71,18 @@ def test_suite(batches: "queue.Queue[Batch]") -> None:
 
     results = run(
         load(),
-        lambda source, target, flags: ask([str(source), str(target), *flags]),
+        lambda source, target, flags: ask([*more, str(source), str(target), *flags]),
         jobs=2,
-        digester=lambda source: ask(["--latents", str(source)]),
+        digester=None if more else lambda source: ask(["--latents", str(source)]),
     )
     failed = [result for result in results if not result.passed]
     assert not failed, "\n" + table(failed)
+
+
+def test_suite(batches: "queue.Queue[Batch]") -> None:
+    judged(batches, [])
+
+
+@pytest.mark.usefixtures("wasm")
+def test_suite_of_webassembly(batches: "queue.Queue[Batch]") -> None:
+    judged(batches, ["--wasm"])

@@ -2,7 +2,7 @@
 
 import { sourcesShape } from "./copies.js";
 import { need, supported, within } from "./errors.js";
-import { MODEL_FILES } from "./model.js";
+import { MODEL_FILES } from "./registered.js";
 import { Values } from "./msgpack.js";
 
 const BYTES_MAX = 2 ** 31 - 1;

@@ -4,10 +4,6 @@ import { need, supported } from "./errors.js";
 
 const LEVEL_SETS = 4;
 
-/** Files of the registered models (PYR-35), relative to this module. */
-const FIRST = new URL("../../proxyimg_codec/models/pyramid-1.bin", import.meta.url);
-export const MODEL_FILES = { 1: FIRST, 2: FIRST };
-
 /** Arrays of a set of networks in their order (PYR-36): name, type, shape; H and C are widths. */
 const CONTEXT = [
   ["first", "int8", "C", 12, 3, 3], ["first_bias", "int32", "C"], ["first_by_step", "int32", "C"],
