@@ -13,6 +13,8 @@ import torch
 from torch import Tensor, nn
 
 from proxyimg_codec.encoder.pyramid.convolutions import Residual
+from proxyimg_codec.encoder.pyramid.load import load as load_model
+from proxyimg_codec.encoder.pyramid.load import native_bfloat16
 from proxyimg_codec.encoder.pyramid.model import Level, Model
 from proxyimg_codec.encoder.pyramid.rate import bits_of_integers
 from proxyimg_codec.encoder.pyramid.refine import (
@@ -24,7 +26,9 @@ from proxyimg_codec.encoder.pyramid.refine import (
     shrunk,
 )
 
+from .latents import KEPT_APART
 from .pictures import Pixels, crop, load
+from .wider import WiderModel
 
 BATCH = 4
 """Crops per batch."""
@@ -34,6 +38,12 @@ STEPS = (3.0, 160.0)
 
 ROUNDS = 10
 """Rounds of refinement of the latents of a batch in the second phase."""
+
+USUAL = 0.6
+"""Bits a pixel of a crop that counts once in relative training."""
+
+AVERAGED = 0.01
+"""Share of the present weights in their running average."""
 
 
 def drawn(model: Model) -> Model:
@@ -62,20 +72,28 @@ def main() -> None:
                         help="range of quantization steps")  # fmt: skip
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument(
+        "--wider",
+        action="store_true",
+        help="train the next model, which starts from model 2, in phase 2: crops "
+        "count by the inverse of their bits, and some pictures are kept apart",
+    )
     args = parser.parse_args()
     torch.set_num_threads(args.threads)
     torch.manual_seed(args.seed)
-    model = drawn(Model())
-    model.set_mode(fast=True)
+    model = WiderModel(load_model(2)) if args.wider else drawn(Model())
+    model.set_mode(fast=native_bfloat16())
     model.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     state: dict[str, Any] = {}
     if args.out.exists():
         state = torch.load(args.out)
     elif args.start:
-        state = {"model": torch.load(args.start)["model"]}
+        state = {"model": torch.load(args.start)["average"]}
     if state:
         model.load_state_dict(state["model"])
     pictures = load(args.folder)
+    if args.wider:
+        pictures = [p for i, p in enumerate(pictures) if i % KEPT_APART]
     run = analysed if args.phase == 1 else refined
     run(model, pictures, state, args)
 
@@ -134,6 +152,7 @@ class Journal:
 
     Attributes:
         done: Number of finished steps.
+        average: Running average of the weights, which is better than those of any one step.
     """
 
     def __init__(self, model: Model, opt: torch.optim.Optimizer, state: dict[str, Any], args: Any):
@@ -141,6 +160,8 @@ class Journal:
         self.done = state.get("done", 0)
         if "optimizer" in state:
             opt.load_state_dict(state["optimizer"])
+        kept = model.state_dict() if "average" not in state else state["average"]
+        self.average = {k: v.detach().clone() for k, v in kept.items()}
         self.start = time.time()
         self.rows: list[tuple[float, float]] = []
 
@@ -162,6 +183,8 @@ class Journal:
     def add(self, distortion: Tensor, rate: Tensor) -> None:
         """Records distortion [B] and rate [B] of a step; saves every 100 steps, and at the end."""
         self.done += 1
+        for name, value in self.model.state_dict().items():
+            self.average[name].lerp_(value, AVERAGED)
         self.rows.append((distortion.mean().item(), rate.mean().item()))
         if self.done % 100 == 0 or self.done >= self.args.steps:
             d, r = np.mean(self.rows, 0)
@@ -169,7 +192,8 @@ class Journal:
             print(f"{self.done} {spent:.0f}s D {d:.4f} R {r:.4f} J {d + RATE_WEIGHT * r:.4f}",
                   flush=True)  # fmt: skip
             self.rows = []
-            state = {"model": self.model.state_dict(), "optimizer": self.opt.state_dict()}
+            state = {"model": self.model.state_dict(), "average": self.average,
+                     "optimizer": self.opt.state_dict()}  # fmt: skip
             temporary = self.args.out.with_suffix(".part")
             torch.save({**state, "done": self.done}, temporary)
             temporary.rename(self.args.out)
@@ -219,15 +243,19 @@ def refined(model: Model, pictures: list[Pixels], state: dict[str, Any], args: A
             ys = [y.contiguous(memory_format=torch.channels_last).requires_grad_() for y in now]
             spent = cost(model, target, ys, smooth=False)
             opt.zero_grad(set_to_none=True)
-            spent.total.backward()  # type: ignore[no-untyped-call]
-            slopes = [y.grad for y in ys if y.grad is not None]
+            pixels = x.shape[2] * x.shape[3]
+            share = torch.ones(BATCH)
+            if args.wider:
+                share = USUAL / (spent.spent.detach() / pixels + USUAL / 20)
+            loss = (share * (spent.error + spent.price * spent.spent)).sum()
+            loss.backward()  # type: ignore[no-untyped-call]
+            slopes = [y.grad / share.view(-1, 1, 1, 1) for y in ys if y.grad is not None]
             ys = [y.detach() for y in ys]
             now = moved(model, step, ys, spent.likely, slopes, random, settle=turn == 0)
             if turn > 0:  # latents of the first round are not refined, unlike those of a file
                 journal.set_rates()
                 torch.nn.utils.clip_grad_norm_(kept, 2e5)
                 opt.step()
-                pixels = x.shape[2] * x.shape[3]
                 journal.add(spent.error.detach() / pixels, spent.spent.detach() / pixels)
             if journal.done >= args.steps:
                 return
