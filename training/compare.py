@@ -50,8 +50,8 @@ def places(paths: list[Path], wanted: int) -> list[Place]:
         spent = [bits_of_integers(y, *p).sum((1, 2, 3)) for y, p in zip(ys, likely, strict=False)]
         weight, q = 1 / (torch.stack(spent).sum(0) + 200), log_step(step)
         low = ys[-1]
-        zeros = [torch.zeros(len(step), 9, max(2 // 2**i, 1), max(2 // 2**i, 1)) for i in range(3)]
-        above = [*ys[:-1], *zeros]
+        none = torch.zeros(len(step), 9, 1, 1)
+        above = [*ys[:-1], none, none]
         for number in range(LEVELS, 0, -1):
             y = ys[number - 1]
             if min(number, 4) == wanted:

@@ -1,11 +1,19 @@
 """The next model starts from model 2, and its contexts see only what was coded before."""
 
+import sys
+
+import cv2
+import numpy as np
 import pytest
 import torch
 
+from proxyimg_codec.encoder.pyramid.convolutions import eight_bit, through, weight_step
 from proxyimg_codec.encoder.pyramid.load import load
 from proxyimg_codec.encoder.pyramid.rate import around, bits_at, bits_of_integers
 from proxyimg_codec.encoder.pyramid.refine import Target, cost
+from proxyimg_codec.texture.registered_model import WIDE
+from training import compare, compare_synthesis, export_wider, pictures
+from training import latents as made
 from training.compare import parsed
 from training.structures import Context, Structure
 from training.wider import WiderModel
@@ -93,3 +101,59 @@ def test_bits_of_neighbours_with_a_chosen_share():
     moving = y.clone().requires_grad_()
     slope = torch.autograd.grad(bits_of_integers(moving, mean, scale, odds).sum(), moving)[0]
     assert torch.allclose(slope, found.slope, atol=1e-2)
+
+
+def test_exported_weights_are_those_of_simulated_integers(tmp_path):
+    wider = WiderModel(load(2))
+    torch.manual_seed(11)
+    with torch.no_grad():
+        for p in wider.parameters():
+            p += torch.randn_like(p) * 0.003
+    arrays = dict(export_wider.arrays_of(wider))
+    net = wider.levels[0].context
+    for name, layer in (("second", net.second), ("out3", net.out[3]), ("back1", net.back[1])):
+        step = weight_step(layer.weight)
+        simulated = through(layer.weight, step, -127, 127).detach().numpy()
+        assert np.array_equal(
+            arrays[f"context 0 {name}"].floats.reshape(simulated.shape), simulated
+        )
+    third = wider.levels[3].wider.third.weight
+    found = arrays["synthesis 3 third"].floats
+    assert np.array_equal(found, eight_bit(third).detach().numpy())
+    size = sum(a.values.size * (4 if any(w in n for w in WIDE) else 1) for n, a in arrays.items())
+    assert len(export_wider.pack(wider)) == 8 + 4 * 6 + len(arrays) + size < 400_000
+
+
+def test_sums_that_are_not_exact_are_refused():
+    wider = WiderModel(load(2))
+    with torch.no_grad():
+        wider.levels[3].context.second.weight.fill_(0.99)
+    with pytest.raises(ValueError, match="layer second"):
+        list(export_wider.arrays_of(wider))
+
+
+def test_latents_and_comparisons(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(pictures, "SIZE", 128)
+    monkeypatch.setattr(made, "SIZE", 128)
+    monkeypatch.setattr(made, "SHARD", 4)
+    monkeypatch.setattr(made, "ROUNDS", 2)
+    (tmp_path / "pictures").mkdir()
+    rng = np.random.default_rng(3)
+    for k in range(2):
+        picture = cv2.GaussianBlur(rng.integers(0, 256, (140, 150, 3)).astype(np.uint8), (0, 0), 3)
+        cv2.imwrite(str(tmp_path / "pictures" / f"{k}.png"), picture)
+
+    def run(module, *words):
+        monkeypatch.setattr(sys, "argv", [module.__name__, *(str(w) for w in words)])
+        module.main()
+        return capsys.readouterr().out
+
+    run(made, tmp_path, tmp_path / "pictures", "--judging", 1, "--learning", 1)
+    found = np.load(tmp_path / "judging-000.npz")
+    assert found["level1"].shape == (4, 9, 64, 64)
+    assert found["lowest"].shape == (4, 3, 2, 2)
+    out = run(compare, tmp_path, "-", "turns=3", "--epochs", 1, "--level", 3)
+    assert "before +0.00" in out
+    assert out.count("judged") == 2
+    out = run(compare_synthesis, tmp_path, "filter=8", "middle=3,hidden=40", "--epochs", 1)
+    assert out.count("judged") == 2
