@@ -30,9 +30,6 @@ from .latents import KEPT_APART
 from .pictures import Pixels, crop, load
 from .wider import WiderModel
 
-BATCH = 4
-"""Crops per batch."""
-
 STEPS = (3.0, 160.0)
 """Range of quantization steps, which are drawn log-uniformly."""
 
@@ -71,6 +68,8 @@ def main() -> None:
     parser.add_argument("--range", type=float, nargs=2, default=STEPS, metavar=("LOW", "HIGH"),
                         help="range of quantization steps")  # fmt: skip
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--batch", type=int, default=4, help="crops a step")
+    parser.add_argument("--device", default="cpu")
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument(
         "--wider",
@@ -80,41 +79,45 @@ def main() -> None:
     )
     args = parser.parse_args()
     torch.set_num_threads(args.threads)
+    torch.set_default_device(args.device)
     torch.manual_seed(args.seed)
     model = WiderModel(load_model(2)) if args.wider else drawn(Model())
     model.set_mode(fast=native_bfloat16())
     model.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     state: dict[str, Any] = {}
     if args.out.exists():
-        state = torch.load(args.out)
+        state = torch.load(args.out, map_location=args.device)
     elif args.start:
-        state = {"model": torch.load(args.start)["average"]}
+        state = {"model": torch.load(args.start, map_location=args.device)["average"]}
     if state:
         model.load_state_dict(state["model"])
     pictures = load(args.folder)
     if args.wider:
         pictures = [p for i, p in enumerate(pictures) if i % KEPT_APART]
     run = analysed if args.phase == 1 else refined
-    run(model, pictures, state, args)
+    try:
+        run(model, pictures, state, args)
+    finally:
+        torch.set_default_device(None)
 
 
 def batch(
-    pictures: list[Pixels], rng: np.random.Generator, steps: tuple[float, float]
+    pictures: list[Pixels], rng: np.random.Generator, args: argparse.Namespace
 ) -> tuple[Tensor, Tensor]:
     """Draws a batch.
 
     Args:
         pictures: Pictures as RGB, uint8 [H, W, 3].
         rng: Generator of all random choices.
-        steps: Range of quantization steps.
+        args: Arguments of the command line.
 
     Returns:
         float32 [B, 3, S, S] crops in 0..255, and float32 [B] their quantization steps.
     """
-    crops = np.stack([crop(pictures, rng) for _ in range(BATCH)]).transpose(0, 3, 1, 2)
-    step = np.exp(rng.uniform(math.log(steps[0]), math.log(steps[1]), BATCH))
-    x = torch.from_numpy(crops.astype(np.float32)).to(memory_format=torch.channels_last)
-    return x, torch.from_numpy(step.astype(np.float32))
+    crops = np.stack([crop(pictures, rng) for _ in range(args.batch)]).transpose(0, 3, 1, 2)
+    step = np.exp(rng.uniform(math.log(args.range[0]), math.log(args.range[1]), args.batch))
+    x = torch.tensor(crops.astype(np.float32)).contiguous(memory_format=torch.channels_last)
+    return x, torch.tensor(step.astype(np.float32))
 
 
 def groups_of(model: Model, *, analysis: bool, rate: float) -> list[dict[str, Any]]:
@@ -206,7 +209,7 @@ def analysed(model: Model, pictures: list[Pixels], state: dict[str, Any], args: 
     journal = Journal(model, opt, state, args)
     while journal.done < args.steps:
         journal.set_rates()
-        x, step = batch(pictures, journal.rng(), args.range)
+        x, step = batch(pictures, journal.rng(), args)
         latents = [y + (torch.round(y) - y).detach() for y in model.analyse(x, step)]
         likely = model.likelihoods(latents, step)
         pixels = x.shape[2] * x.shape[3]
@@ -216,7 +219,7 @@ def analysed(model: Model, pictures: list[Pixels], state: dict[str, Any], args: 
             / pixels
         )
         coded = zip(latents, likely, strict=False)
-        spent = torch.zeros(BATCH)
+        spent = torch.zeros(args.batch)
         for y, p in coded:
             spent = spent + bits_of_integers(y, *p).sum((1, 2, 3)) / pixels
         opt.zero_grad(set_to_none=True)
@@ -234,8 +237,8 @@ def refined(model: Model, pictures: list[Pixels], state: dict[str, Any], args: A
     kept = [p for g in opt.param_groups for p in g["params"]]
     journal = Journal(model, opt, state, args)
     while journal.done < args.steps:
-        x, step = batch(pictures, journal.rng(), args.range)
-        random = torch.Generator().manual_seed(journal.done)
+        x, step = batch(pictures, journal.rng(), args)
+        random = torch.Generator(args.device).manual_seed(journal.done)
         target = Target(x, None, None, None, step)
         with torch.no_grad():
             now = [torch.round(y) for y in shrunk(model.analyse(x, step), DEAD_ZONE)]
@@ -244,7 +247,7 @@ def refined(model: Model, pictures: list[Pixels], state: dict[str, Any], args: A
             spent = cost(model, target, ys, smooth=False)
             opt.zero_grad(set_to_none=True)
             pixels = x.shape[2] * x.shape[3]
-            share = torch.ones(BATCH)
+            share = torch.ones(args.batch)
             if args.wider:
                 share = USUAL / (spent.spent.detach() / pixels + USUAL / 20)
             loss = (share * (spent.error + spent.price * spent.spent)).sum()

@@ -26,10 +26,10 @@ from proxyimg_codec.encoder.pyramid.wavelet import Size, extended, merged
 
 from .structures import Context, Likely, Structure, Synthesis
 
-_EACH = Structure(turns=3, chroma_turns=2, shaped=True)
 STRUCTURES = (
-    _EACH._replace(width=40, ahead=32), *[_EACH._replace(width=64)] * (SHARED_FROM - 1),
-)  # fmt: skip
+    Structure(width=40, ahead=32, shaped=True),
+    *[Structure(width=64, shaped=True)] * (SHARED_FROM - 1),
+)
 """Structures of the context networks of levels 1, 2, 3, and of all coarser levels."""
 
 HIDDEN = (32, 48, 48, 48)

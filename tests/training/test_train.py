@@ -23,9 +23,8 @@ def folder(tmp_path):
 
 def run(monkeypatch, folder, out, phase, steps, *more):
     monkeypatch.setattr(pictures, "SIZE", 64)
-    monkeypatch.setattr(train, "BATCH", 1)
     words = ["train", str(folder), "--out", str(out), "--phase", str(phase), "--steps", str(steps)]
-    monkeypatch.setattr(sys, "argv", [*words, "--threads", "1", *more])
+    monkeypatch.setattr(sys, "argv", [*words, "--threads", "1", "--batch", "1", *more])
     train.main()
     return torch.load(out)
 

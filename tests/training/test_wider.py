@@ -111,7 +111,7 @@ def test_exported_weights_are_those_of_simulated_integers(tmp_path):
             p += torch.randn_like(p) * 0.003
     arrays = dict(export_wider.arrays_of(wider))
     net = wider.levels[0].context
-    for name, layer in (("second", net.second), ("out3", net.out[3]), ("back1", net.back[1])):
+    for name, layer in (("second", net.second), ("out1", net.out[1]), ("back0", net.back[0])):
         step = weight_step(layer.weight)
         simulated = through(layer.weight, step, -127, 127).detach().numpy()
         assert np.array_equal(
