@@ -32,6 +32,7 @@ def main() -> None:
     torch.set_num_threads(1)
     pictures = load(args.folder)[::KEPT_APART]
     base = load_model(2)
+    base.set_mode(integer=True)
     before = found(base, pictures, args)
     for path in args.states:
         model = WiderModel(base)
