@@ -74,7 +74,7 @@ def main() -> None:
     parser.add_argument("out", type=Path, help="folder: pyramid-1.bin and pyramid-1-analysis.npz")
     args = parser.parse_args()
     model = Model()
-    model.load_state_dict(torch.load(args.state)["model"])
+    model.load_state_dict(torch.load(args.state)["average"])
     data = pack(arrays_of(model), *model.sizes)
     (args.out / "pyramid-1.bin").write_bytes(data)
     own = {k: v for k, v in model.state_dict().items() if "analysis" in k or k == "to_planes"}

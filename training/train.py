@@ -14,20 +14,27 @@ from torch import Tensor, nn
 
 from proxyimg_codec.encoder.pyramid.convolutions import Residual
 from proxyimg_codec.encoder.pyramid.goal import DEAD_ZONE, RATE_WEIGHT
+from proxyimg_codec.encoder.pyramid.load import load as load_model
+from proxyimg_codec.encoder.pyramid.load import native_bfloat16
 from proxyimg_codec.encoder.pyramid.model import Level, Model
 from proxyimg_codec.encoder.pyramid.rate import bits_of_integers
 from proxyimg_codec.encoder.pyramid.refine import Target, cost, moves
 
+from .latents import KEPT_APART
 from .pictures import Pixels, crop, load
-
-BATCH = 4
-"""Crops per batch."""
+from .wider import WiderModel
 
 STEPS = (3.0, 160.0)
 """Range of quantization steps, which are drawn log-uniformly."""
 
 ROUNDS = 10
 """Rounds of refinement of the latents of a batch in the second phase."""
+
+USUAL = 0.6
+"""Bits a pixel of a crop that counts once in relative training."""
+
+AVERAGED = 0.01
+"""Share of the present weights in their running average."""
 
 
 def drawn(model: Model) -> Model:
@@ -55,42 +62,56 @@ def main() -> None:
     parser.add_argument("--range", type=float, nargs=2, default=STEPS, metavar=("LOW", "HIGH"),
                         help="range of quantization steps")  # fmt: skip
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--batch", type=int, default=4, help="crops a step")
+    parser.add_argument("--device", default="cpu")
     parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument(
+        "--wider",
+        action="store_true",
+        help="train the next model, which starts from model 2, in phase 2: crops "
+        "count by the inverse of their bits, and some pictures are kept apart",
+    )
     args = parser.parse_args()
     torch.set_num_threads(args.threads)
+    torch.set_default_device(args.device)
     torch.manual_seed(args.seed)
-    model = drawn(Model())
-    model.set_mode(fast=True)
+    model = WiderModel(load_model(2)) if args.wider else drawn(Model())
+    model.set_mode(fast=native_bfloat16())
     model.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     state: dict[str, Any] = {}
     if args.out.exists():
-        state = torch.load(args.out)
+        state = torch.load(args.out, map_location=args.device)
     elif args.start:
-        state = {"model": torch.load(args.start)["model"]}
+        state = {"model": torch.load(args.start, map_location=args.device)["average"]}
     if state:
         model.load_state_dict(state["model"])
     pictures = load(args.folder)
+    if args.wider:
+        pictures = [p for i, p in enumerate(pictures) if i % KEPT_APART]
     run = analysed if args.phase == 1 else refined
-    run(model, pictures, state, args)
+    try:
+        run(model, pictures, state, args)
+    finally:
+        torch.set_default_device(None)
 
 
 def batch(
-    pictures: list[Pixels], rng: np.random.Generator, steps: tuple[float, float]
+    pictures: list[Pixels], rng: np.random.Generator, args: argparse.Namespace
 ) -> tuple[Tensor, Tensor]:
     """Draws a batch.
 
     Args:
         pictures: Pictures as RGB, uint8 [H, W, 3].
         rng: Generator of all random choices.
-        steps: Range of quantization steps.
+        args: Arguments of the command line.
 
     Returns:
         float32 [B, 3, S, S] crops in 0..255, and float32 [B] their quantization steps.
     """
-    crops = np.stack([crop(pictures, rng) for _ in range(BATCH)]).transpose(0, 3, 1, 2)
-    step = np.exp(rng.uniform(math.log(steps[0]), math.log(steps[1]), BATCH))
-    x = torch.from_numpy(crops.astype(np.float32)).to(memory_format=torch.channels_last)
-    return x, torch.from_numpy(step.astype(np.float32))
+    crops = np.stack([crop(pictures, rng) for _ in range(args.batch)]).transpose(0, 3, 1, 2)
+    step = np.exp(rng.uniform(math.log(args.range[0]), math.log(args.range[1]), args.batch))
+    x = torch.tensor(crops.astype(np.float32)).contiguous(memory_format=torch.channels_last)
+    return x, torch.tensor(step.astype(np.float32))
 
 
 def groups_of(model: Model, *, analysis: bool, rate: float) -> list[dict[str, Any]]:
@@ -128,6 +149,7 @@ class Journal:
 
     Attributes:
         done: Number of finished steps.
+        average: Running average of the weights, which is better than those of any one step.
     """
 
     def __init__(self, model: Model, opt: torch.optim.Optimizer, state: dict[str, Any], args: Any):
@@ -135,6 +157,8 @@ class Journal:
         self.done = state.get("done", 0)
         if "optimizer" in state:
             opt.load_state_dict(state["optimizer"])
+        kept = model.state_dict() if "average" not in state else state["average"]
+        self.average = {k: v.detach().clone() for k, v in kept.items()}
         self.start = time.time()
         self.rows: list[tuple[float, float]] = []
 
@@ -156,6 +180,8 @@ class Journal:
     def add(self, distortion: Tensor, rate: Tensor) -> None:
         """Records distortion [B] and rate [B] of a step; saves every 100 steps, and at the end."""
         self.done += 1
+        for name, value in self.model.state_dict().items():
+            self.average[name].lerp_(value, AVERAGED)
         self.rows.append((distortion.mean().item(), rate.mean().item()))
         if self.done % 100 == 0 or self.done >= self.args.steps:
             d, r = np.mean(self.rows, 0)
@@ -163,7 +189,8 @@ class Journal:
             print(f"{self.done} {spent:.0f}s D {d:.4f} R {r:.4f} J {d + RATE_WEIGHT * r:.4f}",
                   flush=True)  # fmt: skip
             self.rows = []
-            state = {"model": self.model.state_dict(), "optimizer": self.opt.state_dict()}
+            state = {"model": self.model.state_dict(), "average": self.average,
+                     "optimizer": self.opt.state_dict()}  # fmt: skip
             temporary = self.args.out.with_suffix(".part")
             torch.save({**state, "done": self.done}, temporary)
             temporary.rename(self.args.out)
@@ -176,7 +203,7 @@ def analysed(model: Model, pictures: list[Pixels], state: dict[str, Any], args: 
     journal = Journal(model, opt, state, args)
     while journal.done < args.steps:
         journal.set_rates()
-        x, step = batch(pictures, journal.rng(), args.range)
+        x, step = batch(pictures, journal.rng(), args)
         latents = [y + (torch.round(y) - y).detach() for y in model.analyse(x, step)]
         likely = model.likelihoods(latents, step)
         pixels = x.shape[2] * x.shape[3]
@@ -186,7 +213,7 @@ def analysed(model: Model, pictures: list[Pixels], state: dict[str, Any], args: 
             / pixels
         )
         coded = zip(latents, likely, strict=False)
-        spent = torch.zeros(BATCH)
+        spent = torch.zeros(args.batch)
         for y, p in coded:
             spent = spent + bits_of_integers(y, *p).sum((1, 2, 3)) / pixels
         opt.zero_grad(set_to_none=True)
@@ -204,7 +231,7 @@ def refined(model: Model, pictures: list[Pixels], state: dict[str, Any], args: A
     kept = [p for g in opt.param_groups for p in g["params"]]
     journal = Journal(model, opt, state, args)
     while journal.done < args.steps:
-        x, step = batch(pictures, journal.rng(), args.range)
+        x, step = batch(pictures, journal.rng(), args)
         target = Target(x, None, None, None, step)
         with torch.no_grad():
             *found, lowest = model.analyse(x, step)
@@ -215,8 +242,13 @@ def refined(model: Model, pictures: list[Pixels], state: dict[str, Any], args: A
             ys = [y.contiguous(memory_format=torch.channels_last).requires_grad_() for y in now]
             spent = cost(model, target, ys, smooth=False)
             opt.zero_grad(set_to_none=True)
-            spent.total.backward()  # type: ignore[no-untyped-call]
-            slopes = [y.grad for y in ys if y.grad is not None]
+            pixels = x.shape[2] * x.shape[3]
+            share = torch.ones(args.batch)
+            if args.wider:
+                share = USUAL / (spent.spent.detach() / pixels + USUAL / 20)
+            loss = (share * (spent.error + spent.price * spent.spent)).sum()
+            loss.backward()  # type: ignore[no-untyped-call]
+            slopes = [y.grad / share.view(-1, 1, 1, 1) for y in ys if y.grad is not None]
             ys = [y.detach() for y in ys]
             changes = moves(model, target, ys, spent.likely, slopes, turn, last)
             last = [torch.where(c != 0, c, v) for c, v in zip(changes, last, strict=True)]
@@ -225,7 +257,6 @@ def refined(model: Model, pictures: list[Pixels], state: dict[str, Any], args: A
                 journal.set_rates()
                 torch.nn.utils.clip_grad_norm_(kept, 2e5)
                 opt.step()
-                pixels = x.shape[2] * x.shape[3]
                 journal.add(spent.error.detach() / pixels, spent.spent.detach() / pixels)
             if journal.done >= args.steps:
                 return

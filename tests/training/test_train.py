@@ -16,31 +16,34 @@ def folder(tmp_path):
     y, x = np.mgrid[:80, :90]
     picture = np.stack([2 * x, 3 * y, 128 + 40 * np.sin(x / 5)], 2).clip(0, 255).astype(np.uint8)
     (tmp_path / "pictures").mkdir()
-    cv2.imwrite(str(tmp_path / "pictures" / "a.png"), picture)
+    for name in "ab":
+        cv2.imwrite(str(tmp_path / "pictures" / f"{name}.png"), picture)
     return tmp_path / "pictures"
 
 
 def run(monkeypatch, folder, out, phase, steps, *more):
     monkeypatch.setattr(pictures, "SIZE", 64)
-    monkeypatch.setattr(train, "BATCH", 1)
     words = ["train", str(folder), "--out", str(out), "--phase", str(phase), "--steps", str(steps)]
-    monkeypatch.setattr(sys, "argv", [*words, "--threads", "1", *more])
+    monkeypatch.setattr(sys, "argv", [*words, "--threads", "1", "--batch", "1", *more])
     train.main()
     return torch.load(out)
 
 
-@pytest.mark.parametrize("phase", [1, 2])
-def test_a_resumed_run_is_an_unbroken_one(monkeypatch, folder, tmp_path, phase, capsys):
+@pytest.mark.parametrize("kind", ["1", "2", "2 --wider"])
+def test_a_resumed_run_is_an_unbroken_one(monkeypatch, folder, tmp_path, kind, capsys):
+    phase, more = int(kind[0]), kind.split()[1:]
+    monkeypatch.setattr(train, "KEPT_APART", 2)
     # Phase 2 is resumed between batches: after a multiple of the steps of one.
     half = 3 if phase == 1 else train.ROUNDS - 1
     # The cosine depends on the planned length: hold it still.
     monkeypatch.setattr(train.Journal, "set_rates", lambda self: None)
-    run(monkeypatch, folder, tmp_path / "parts.pt", phase, half)
-    parts = run(monkeypatch, folder, tmp_path / "parts.pt", phase, 2 * half)
-    whole = run(monkeypatch, folder, tmp_path / "whole.pt", phase, 2 * half)
+    run(monkeypatch, folder, tmp_path / "parts.pt", phase, half, *more)
+    parts = run(monkeypatch, folder, tmp_path / "parts.pt", phase, 2 * half, *more)
+    whole = run(monkeypatch, folder, tmp_path / "whole.pt", phase, 2 * half, *more)
     assert parts["done"] == whole["done"] == 2 * half
-    for name, value in whole["model"].items():
-        assert torch.equal(value, parts["model"][name]), name
+    for kind in ("model", "average"):
+        for name, value in whole[kind].items():
+            assert torch.equal(value, parts[kind][name]), name
     assert "J" in capsys.readouterr().out
 
 
@@ -52,7 +55,7 @@ def test_export_is_what_the_decoder_reads(monkeypatch, folder, tmp_path):
     export.main()
     data = (tmp_path / "pyramid-1.bin").read_bytes()
     found = registered_model.unpack(data)
-    trained = torch.load(tmp_path / "state.pt")["model"]
+    trained = torch.load(tmp_path / "state.pt")["average"]
     first = trained["levels.0.first.weight"].numpy()
     assert np.abs(found.context[0].first.floats - first).max() <= 2.0 ** (
         found.context[0].first.exponent - 1

@@ -62,11 +62,20 @@ class _Bits(torch.autograd.Function):
         return torch.where(flip, -by_offset, by_offset), first * scale_first + second * scale_second
 
 
-def _tails(distance: Tensor, rate: Tensor) -> tuple[Tensor, Tensor]:
+def _tails(
+    distance: Tensor, rate: Tensor, share: Tensor | float = TAIL_SHARE
+) -> tuple[Tensor, Tensor]:
     """Survival functions of both parts of the mixture at a distance >= 0 from the mean."""
-    near = torch.exp(-distance * rate) * ((1 - TAIL_SHARE) / 2)
-    far = torch.exp(distance * rate * (-1 / TAIL_RATIO)) * (TAIL_SHARE / 2)
+    near = torch.exp(-distance * rate) * ((1 - share) / 2)
+    far = torch.exp(distance * rate * (-1 / TAIL_RATIO)) * (share / 2)
     return near, far
+
+
+def _share(odds: Tensor | None) -> Tensor | float:
+    """Share of the wide part, for what is added to the logarithm of its odds."""
+    if odds is None:
+        return TAIL_SHARE
+    return torch.sigmoid(odds + math.log(TAIL_SHARE / (1 - TAIL_SHARE)))
 
 
 def bits(values: Tensor, mean: Tensor, log_scale: Tensor) -> Tensor:
@@ -95,10 +104,31 @@ class _Smooth(torch.autograd.Function):
         return grad * by_offset, grad * by_scale
 
 
-def bits_of_integers(values: Tensor, mean: Tensor, log_scale: Tensor) -> Tensor:
-    """Bits of integer latents, with the gradient that they have as a smooth function of them."""
+def bits_of_integers(
+    values: Tensor, mean: Tensor, log_scale: Tensor, odds: Tensor | None = None
+) -> Tensor:
+    """Bits of integer latents, with the gradient that they have as a smooth function of them.
+
+    Args:
+        values: The latents.
+        mean: Means.
+        log_scale: Natural logarithms of the scales.
+        odds: What is added to the logarithm of the odds of the wide part of the mixture, in models
+            that choose it; None = 0.
+    """
+    if odds is not None:
+        return _mixed(values - mean, log_scale, odds)
     found: Tensor = _Smooth.apply(values - mean, log_scale)  # type: ignore[no-untyped-call]  # torch's stubs
     return found
+
+
+def _mixed(offset: Tensor, log_scale: Tensor, odds: Tensor) -> Tensor:
+    """Bits of integers that differ from their means by `offset`, differentiable by all."""
+    distance, rate, share = offset.abs(), torch.exp(-log_scale), _share(odds)
+    near, far = _tails(distance + 0.5, rate, share)
+    inner, outer = _tails((distance - 0.5).abs(), rate, share)
+    inside = torch.where(distance < 0.5, 1 - inner - outer, inner + outer)
+    return -torch.log2((inside - near - far).clamp_min(_LEAST))
 
 
 @torch.no_grad()
@@ -127,15 +157,19 @@ class Around(NamedTuple):
 
 
 @torch.no_grad()
-def around(values: Tensor, mean: Tensor, log_scale: Tensor) -> Around:
-    """Bits of integer latents and of their neighbours; without gradient."""
+def around(values: Tensor, mean: Tensor, log_scale: Tensor, odds: Tensor | None = None) -> Around:
+    """Bits of integer latents and of their neighbours; without gradient.
+
+    Arguments are those of `bits_of_integers`.
+    """
+    share = _share(odds)
     offset = values - mean
     rate = torch.exp(-log_scale)
     distance = offset.abs()
     survivals, densities = [], []
     for shift in (-1.5, -0.5, 0.5, 1.5):
         z = distance + shift
-        near, far = _tails(z.abs(), rate)
+        near, far = _tails(z.abs(), rate, share)
         survivals.append(torch.where(z < 0, 1 - near - far, near + far))
         densities.append(near + far / TAIL_RATIO)
     nearer, here, farther = ((a - b).clamp_min(_LEAST) for a, b in itertools.pairwise(survivals))

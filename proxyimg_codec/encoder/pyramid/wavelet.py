@@ -58,7 +58,8 @@ def extended(low: Tensor, high: Tensor, size: Size) -> Tensor:
 
     def extend(x: Tensor, *ways: int) -> Tensor:
         for dim, n, high in zip((2, 3), size, ways, strict=True):
-            x = x.index_select(dim, torch.from_numpy(mirrored_indices(n, bool(high))))
+            index = torch.from_numpy(mirrored_indices(n, bool(high)))
+            x = x.index_select(dim, index.to(x.device))
         return x
 
     parts = [extend(high[:, band::3], *ways) for band, ways in enumerate(BANDS)]
