@@ -1,8 +1,8 @@
 """Encoding beside other programs, and in bfloat16: python -m benchmarks.encoder PICTURE ...
 
 `beside` encodes a picture alone, twice at once, and beside a busy process, in turn; the medians of
-the ratios are printed. `bfloat16` encodes with convolutions in float32 and in bfloat16. Both take
-the central 256x256 pixels of each picture.
+the ratios are printed. `bfloat16` encodes for MS-SSIM, which torch does, with convolutions in
+float32 and in bfloat16. Both take the central 256x256 pixels of each picture.
 """
 
 from __future__ import annotations
@@ -92,12 +92,13 @@ def precision(pixels: Pixels, effort: int, fast: bool) -> str:
     import proxyimg_codec as pxi
     from proxyimg_codec.bench.measure import psnr
     from proxyimg_codec.encoder.pyramid import load
+    from proxyimg_codec.encoder.pyramid.encode import NUMBER
 
-    model = load.load(1)
+    model = load.load(NUMBER)
     model.set_mode(fast=fast)
     try:
         started = time.process_time()
-        image = pxi.encode(pixels, effort=effort, max_layers=1)
+        image = pxi.encode(pixels, effort=effort, max_layers=1, tune="ms-ssim")
         seconds = time.process_time() - started
     finally:
         model.set_mode(fast=load.native_bfloat16())
