@@ -262,7 +262,10 @@ def _too_coarse(
     clear = np.ones(alpha.shape, np.float32)
     for boundary in boundaries:
         clear *= 1 - coverage_of(boundary, width, height).reshape(height, width)
-    missed = alpha + clear - 1
+    covered = 1 - clear
+    if not ((alpha > 0) & (alpha < 1)).any():  # then whole pixels count, not the steps of the rim
+        covered = np.rint(covered)
+    missed = alpha - covered
     error = SEEN * 255**2 * float(((np.maximum(missed, 0) if soft else missed) ** 2).mean())
     return error > TOLERABLE[soft] * 2 ** (1.5 * settings.step / 64) / 10
 
