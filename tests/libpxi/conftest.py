@@ -1,6 +1,7 @@
 """libpxi, built once and kept for the next run; tests are skipped where it cannot be."""
 
 import fcntl
+import os
 import shutil
 import subprocess
 from pathlib import Path
@@ -50,9 +51,14 @@ def build(pytestconfig):
     modules = ["pkg-config", "--exists", "gdk-pixbuf-2.0", "gmodule-no-export-2.0"]
     pixbuf = shutil.which("pkg-config") and not subprocess.run(modules).returncode
     options = ["-DPXI_LEVELS=OFF", f"-DPXI_PIXBUF={'ON' if pixbuf else 'OFF'}"]
-    with open(folder / "lock", "w") as lock:  # other workers wait for the first
+    # Other workers wait for the first, and do not link anew what it already runs.
+    run_of_all, stamp = os.environ.get("PYTEST_XDIST_TESTRUNUID"), folder / "stamp"
+    with open(folder / "lock", "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        return built(folder / "build", *options, "-DCMAKE_INSTALL_PREFIX=/opt/pxi")
+        if run_of_all is None or not stamp.exists() or stamp.read_text() != run_of_all:
+            built(folder / "build", *options, "-DCMAKE_INSTALL_PREFIX=/opt/pxi")
+            stamp.write_text(run_of_all or "")
+    return folder / "build"
 
 
 @pytest.fixture(scope="session")
