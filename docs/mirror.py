@@ -10,7 +10,7 @@ from mkdocs.structure.files import File, Files
 PATTERNS = (
     "[A-Z]*.md",
     "docs/**/*.md",
-    "docs/images/*",
+    "docs/images/**/*.*",
     "docs/*.json",
     "spec/*.md",
     "spec/example.pxi",
