@@ -18,6 +18,7 @@ from proxyimg_codec.encoder.pyramid.load import load as load_model
 from proxyimg_codec.encoder.pyramid.model import log_step, plain_synthesis
 from proxyimg_codec.encoder.pyramid.rate import bits_of_integers
 
+from .latents import stored
 from .structures import Context, Structure
 
 
@@ -43,12 +44,7 @@ def places(paths: list[Path], wanted: int) -> list[Place]:
     """Reads a level of files of `training.latents`; 4 is level 4 and all that are coarser."""
     model, out = load_model(2), []
     for path in paths:
-        data = np.load(path)
-        names = [*(f"level{i}" for i in range(1, LEVELS + 1)), "lowest"]
-        ys = [torch.from_numpy(data[n].astype(np.float32)) for n in names]
-        step = torch.from_numpy(data["steps"])
-        likely = model.likelihoods(ys, step)
-        spent = [bits_of_integers(y, *p).sum((1, 2, 3)) for y, p in zip(ys, likely, strict=False)]
+        _, ys, step, spent = stored(path, model)
         weight, q = 1 / (torch.stack(spent).sum(0) + 200), log_step(step)
         low = ys[-1]
         none = torch.zeros(len(step), 9, 1, 1)
@@ -96,7 +92,7 @@ def learnt(net: Context, found: list[Place], epochs: float, rate: float, size: i
                 0.51 + 0.49 * math.cos(math.pi * done / steps))  # fmt: skip
             own = bits_of_integers(p.y, *net(p.low, p.parent, p.grand, p.y, p.q)).sum((1, 2, 3))
             opt.zero_grad(set_to_none=True)
-            (own * p.weight).mean().backward()  # type: ignore[no-untyped-call]
+            (own * p.weight).mean().backward()  # type: ignore[no-untyped-call]  # torch's stubs
             torch.nn.utils.clip_grad_norm_(net.parameters(), 0.1)
             opt.step()
             done += 1
@@ -105,7 +101,7 @@ def learnt(net: Context, found: list[Place], epochs: float, rate: float, size: i
 def parsed(text: str) -> Structure:
     """Reads a structure: attributes as name=value, joined by commas; `-` is that of model 2."""
     pairs = [word.split("=") for word in text.split(",") if word != "-"]
-    return Structure(**{k: int(v) for k, v in pairs})  # type: ignore[arg-type]
+    return Structure(**{k: int(v) for k, v in pairs})  # type: ignore[arg-type]  # flags are read as numbers
 
 
 def main() -> None:
@@ -129,7 +125,7 @@ def main() -> None:
     )
     for s in args.structures:
         torch.manual_seed(1)
-        net = Context(s, load_model(2).level(args.level)).to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+        net = Context(s, load_model(2).level(args.level)).to(memory_format=torch.channels_last)  # type: ignore[call-overload]  # torch's stubs
         changed = {k: v for k, v in s._asdict().items() if v != Structure._field_defaults[k]}
         before, start = judged(net, judging), time.process_time()
         learnt(net, learning, args.epochs, args.rate, args.size)

@@ -16,9 +16,9 @@ from torch.nn import functional as F
 from proxyimg_codec.encoder.pyramid.goal import LEVELS, RATE_WEIGHT
 from proxyimg_codec.encoder.pyramid.load import load as load_model
 from proxyimg_codec.encoder.pyramid.model import Level, high_pass, log_step, soft
-from proxyimg_codec.encoder.pyramid.rate import bits_of_integers
 from proxyimg_codec.encoder.pyramid.wavelet import extended, merged
 
+from .latents import stored
 from .structures import Synthesis
 
 
@@ -82,14 +82,8 @@ def cases(paths: list[Path]) -> list[Case]:
     """Reads files of `training.latents`."""
     model, out = load_model(2), []
     for path in paths:
-        data = np.load(path)
-        names = [*(f"level{i}" for i in range(1, LEVELS + 1)), "lowest"]
-        ys = [torch.from_numpy(data[n].astype(np.float32)) for n in names]
-        step = torch.from_numpy(data["steps"])
-        likely = model.likelihoods(ys, step)
-        spent = sum(
-            bits_of_integers(y, *p).sum((1, 2, 3)) for y, p in zip(ys, likely, strict=False)
-        )
+        x, ys, step, bits = stored(path, model)
+        spent = sum(bits)
         q, low = log_step(step), ys[-1]
         for number in range(LEVELS, 1, -1):
             level = model.level(number)
@@ -97,7 +91,6 @@ def cases(paths: list[Path]) -> list[Case]:
                 low, ys[number - 1] * level.gains(q), q, ys[number - 2].shape[2:]
             )
         high = ys[0] * model.level(1).gains(q)
-        x = torch.from_numpy(data["pictures"].astype(np.float32))
         weight = 1 / (step**2 * RATE_WEIGHT * (spent + 200))
         out.append(Case(low.contiguous(memory_format=torch.channels_last),
                         high.contiguous(memory_format=torch.channels_last), q, x,
@@ -138,7 +131,7 @@ def main() -> None:
         pairs = [word.split("=") for word in text.split(",") if word != "-"]
         shape = Shape(**{k: int(v) for k, v in pairs})
         torch.manual_seed(1)
-        net = Finest(shape, model.level(1)).to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+        net = Finest(shape, model.level(1)).to(memory_format=torch.channels_last)  # type: ignore[call-overload]  # torch's stubs
         before, start = judged(net, model.to_colour, judging), time.process_time()
         learnt(net, model.to_colour, learning, args)
         spent = time.process_time() - start
@@ -171,7 +164,7 @@ def learnt(net: Finest, colour: Tensor, found: list[Case], args: argparse.Namesp
                     0.51 + 0.49 * math.cos(math.pi * done / steps))  # fmt: skip
             c = Case(*(v[i : i + args.size] for v in case))
             opt.zero_grad(set_to_none=True)
-            losses(net, colour, c)[1].mean().backward()  # type: ignore[no-untyped-call]
+            losses(net, colour, c)[1].mean().backward()  # type: ignore[no-untyped-call]  # torch's stubs
             torch.nn.utils.clip_grad_norm_(net.parameters(), 0.1)
             opt.step()
             done += 1

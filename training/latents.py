@@ -5,15 +5,17 @@ from __future__ import annotations
 import argparse
 import math
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from proxyimg_codec.encoder.pyramid.goal import DEAD_ZONE
+from proxyimg_codec.encoder.pyramid.goal import DEAD_ZONE, LEVELS
 from proxyimg_codec.encoder.pyramid.load import load as load_model
 from proxyimg_codec.encoder.pyramid.model import Model
-from proxyimg_codec.encoder.pyramid.refine import Target, cost, moves
+from proxyimg_codec.encoder.pyramid.rate import bits_of_integers
+from proxyimg_codec.encoder.pyramid.refine import Target, after, cost, moves
 
 from .pictures import SIZE, Pixels, crop, load
 
@@ -89,13 +91,45 @@ def plain(pictures: list[Pixels], rng: np.random.Generator) -> Pixels:
     return picture[y : y + SIZE, x : x + SIZE]
 
 
+@torch.no_grad()
+def unrefined(model: Model, x: Tensor, step: Tensor) -> list[Tensor]:
+    """Integer latents of pictures [B, 3, H, W] that refinement begins with."""
+    *found, lowest = model.analyse(x, step)
+    small = [y - y.clamp(-DEAD_ZONE, DEAD_ZONE) for y in found]
+    return [torch.round(y) for y in (*small, lowest)]
+
+
+class Stored(NamedTuple):
+    """A file of crops.
+
+    Attributes:
+        pictures: [B, 3, H, W] in 0..255.
+        latents: Latents of levels 1, 2, ..., then the lowest planes.
+        step: [B] quantization steps.
+        spent: For each level, [B] bits with the model.
+    """
+
+    pictures: Tensor
+    latents: list[Tensor]
+    step: Tensor
+    spent: list[Tensor]
+
+
+def stored(path: Path, model: Model) -> Stored:
+    """Reads a file of crops."""
+    data = np.load(path)
+    names = [*(f"level{i}" for i in range(1, LEVELS + 1)), "lowest"]
+    x, *ys = (torch.from_numpy(data[n].astype(np.float32)) for n in ("pictures", *names))
+    step = torch.from_numpy(data["steps"])
+    likely = model.likelihoods(ys, step)
+    spent = [bits_of_integers(y, *p).sum((1, 2, 3)) for y, p in zip(ys, likely, strict=False)]
+    return Stored(x, ys, step, spent)
+
+
 def refined(model: Model, x: Tensor, step: Tensor, rounds: int) -> list[Tensor]:
     """Finds refined integer latents of pictures [B, 3, H, W] for a model, as training does."""
     target = Target(x, None, None, None, step)
-    with torch.no_grad():
-        *found, lowest = model.analyse(x, step)
-        small = [y - y.clamp(-DEAD_ZONE, DEAD_ZONE) for y in found]
-        now = [torch.round(y) for y in (*small, lowest)]
+    now = unrefined(model, x, step)
     last = [torch.zeros_like(y) for y in now]
     for turn in range(rounds):
         ys = [y.detach().requires_grad_() for y in now]
@@ -103,8 +137,7 @@ def refined(model: Model, x: Tensor, step: Tensor, rounds: int) -> list[Tensor]:
         slopes = torch.autograd.grad(spent.total, ys)
         ys = [y.detach() for y in ys]
         changes = moves(model, target, ys, spent.likely, slopes, turn, last)
-        last = [torch.where(c != 0, c, v) for c, v in zip(changes, last, strict=True)]
-        now = [y + c for y, c in zip(ys, changes, strict=True)]
+        now, last = after(ys, changes, last)
     return now
 
 

@@ -13,14 +13,14 @@ import torch
 from torch import Tensor, nn
 
 from proxyimg_codec.encoder.pyramid.convolutions import Residual
-from proxyimg_codec.encoder.pyramid.goal import DEAD_ZONE, RATE_WEIGHT
+from proxyimg_codec.encoder.pyramid.goal import RATE_WEIGHT
 from proxyimg_codec.encoder.pyramid.load import load as load_model
 from proxyimg_codec.encoder.pyramid.load import native_bfloat16
 from proxyimg_codec.encoder.pyramid.model import Level, Model
 from proxyimg_codec.encoder.pyramid.rate import bits_of_integers
-from proxyimg_codec.encoder.pyramid.refine import Target, cost, moves
+from proxyimg_codec.encoder.pyramid.refine import Target, after, cost, moves
 
-from .latents import KEPT_APART
+from .latents import KEPT_APART, unrefined
 from .pictures import Pixels, crop, load
 from .wider import WiderModel
 
@@ -77,7 +77,7 @@ def main() -> None:
     torch.manual_seed(args.seed)
     model = WiderModel(load_model(2)) if args.wider else drawn(Model())
     model.set_mode(fast=native_bfloat16())
-    model.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+    model.to(memory_format=torch.channels_last)  # type: ignore[call-overload]  # torch's stubs
     state: dict[str, Any] = {}
     if args.out.exists():
         state = torch.load(args.out, map_location=args.device)
@@ -217,7 +217,7 @@ def analysed(model: Model, pictures: list[Pixels], state: dict[str, Any], args: 
         for y, p in coded:
             spent = spent + bits_of_integers(y, *p).sum((1, 2, 3)) / pixels
         opt.zero_grad(set_to_none=True)
-        (distortion + RATE_WEIGHT * spent).mean().backward()  # type: ignore[no-untyped-call]
+        (distortion + RATE_WEIGHT * spent).mean().backward()  # type: ignore[no-untyped-call]  # torch's stubs
         torch.nn.utils.clip_grad_norm_(model.parameters(), 1.0)
         opt.step()
         journal.add(distortion, spent)
@@ -233,10 +233,7 @@ def refined(model: Model, pictures: list[Pixels], state: dict[str, Any], args: A
     while journal.done < args.steps:
         x, step = batch(pictures, journal.rng(), args)
         target = Target(x, None, None, None, step)
-        with torch.no_grad():
-            *found, lowest = model.analyse(x, step)
-            small = [y - y.clamp(-DEAD_ZONE, DEAD_ZONE) for y in found]
-            now = [torch.round(y) for y in (*small, lowest)]
+        now = unrefined(model, x, step)
         last = [torch.zeros_like(y) for y in now]
         for turn in range(ROUNDS):
             ys = [y.contiguous(memory_format=torch.channels_last).requires_grad_() for y in now]
@@ -247,12 +244,11 @@ def refined(model: Model, pictures: list[Pixels], state: dict[str, Any], args: A
             if args.wider:
                 share = USUAL / (spent.spent.detach() / pixels + USUAL / 20)
             loss = (share * (spent.error + spent.price * spent.spent)).sum()
-            loss.backward()  # type: ignore[no-untyped-call]
+            loss.backward()  # type: ignore[no-untyped-call]  # torch's stubs
             slopes = [y.grad / share.view(-1, 1, 1, 1) for y in ys if y.grad is not None]
             ys = [y.detach() for y in ys]
             changes = moves(model, target, ys, spent.likely, slopes, turn, last)
-            last = [torch.where(c != 0, c, v) for c, v in zip(changes, last, strict=True)]
-            now = [y + c for y, c in zip(ys, changes, strict=True)]
+            now, last = after(ys, changes, last)
             if turn > 0:  # latents of the first round are not refined, unlike those of a file
                 journal.set_rates()
                 torch.nn.utils.clip_grad_norm_(kept, 2e5)

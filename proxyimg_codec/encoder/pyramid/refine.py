@@ -217,10 +217,17 @@ def improved(
             break
         slopes = torch.autograd.grad(total, ys)
         changes = moves(model, target, now, spent.likely, slopes, done + turn, last)
-        last = [torch.where(c != 0, c, v) for c, v in zip(changes, last, strict=True)]
-        now = [y + c for y, c in zip(now, changes, strict=True)]
+        now, last = after(now, changes, last)
         tick()
     return best
+
+
+def after(
+    latents: Sequence[Tensor], changes: Sequence[Tensor], last: Sequence[Tensor]
+) -> tuple[list[Tensor], list[Tensor]]:
+    """Latents after the changes of a round, and the last move of each; see `moves`."""
+    made = [torch.where(c != 0, c, v) for c, v in zip(changes, last, strict=True)]
+    return [y + c for y, c in zip(latents, changes, strict=True)], made
 
 
 @torch.no_grad()
