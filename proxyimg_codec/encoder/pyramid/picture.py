@@ -23,7 +23,7 @@ from ..completion.behind import Source, pixels_behind
 from ..completion.hidden import copies_of
 from ..completion.membrane import continued, continued_from
 from ..settings import Settings
-from ..shapes.coverage import coverage_of
+from ..shapes.coverage import coverage_of, coverage_together
 from ..shapes.layers import Plan, alike
 from .encode import CELL, EFFORTS, Raster, encode
 from .goal import Effort
@@ -80,9 +80,10 @@ def encode_picture(
         UsageError: A target size or PSNR is out of reach.
     """
     height, width = picture.shape[:2]
-    views, softs, share = _views(picture, plan)
+    views, softs = _views(picture, plan)
     rasters = [colour_of(picture)._replace(structural=settings.tune == "ms-ssim")]
     if plan.channels == 4:
+        share = coverage_together([v.boundary for v in plan.layers], width, height)
         rasters.append(alpha_of(within(picture[..., 3], share, alike(settings))))
     shared = len(rasters)
     own = [] if behind is None else _behind(rasters, views[0][1], behind)
@@ -112,21 +113,19 @@ def encode_picture(
     return encode_rasters(rasters, picture_of, picture, settings, report)
 
 
-def _views(picture: Floats, plan: Plan) -> tuple[list[View], dict[int, Soft], Floats]:
-    """Rectangles and cuts of all layers, rasters of soft ones, and coverage of all together."""
+def _views(picture: Floats, plan: Plan) -> tuple[list[View], dict[int, Soft]]:
+    """Rectangles and cuts of all layers, and rasters of soft ones."""
     height, width = picture.shape[:2]
     boundaries = [v.boundary for v in plan.layers]
     views, softs = list[View](), dict[int, Soft]()
-    clear = np.ones((height, width), np.float32)
     for k, layer in enumerate(plan.layers):
         covered = coverage_of(layer.boundary, width, height).reshape(height, width)
-        clear *= 1 - covered
         box, cuts = _view(boundaries, k, covered)
         if layer.alpha is not None and cuts is not None:
             found = soft_rasters(picture[..., :3], layer.alpha, covered, cuts)
             softs |= {} if found is None else {k: found}
         views.append((box, replace(cuts, unmix=False) if cuts and k in softs else cuts))
-    return views, softs, 1 - clear
+    return views, softs
 
 
 def encode_rasters(

@@ -15,7 +15,7 @@ from ...geometry.mesh import Mesh
 from ...texture.network import Floats
 from ..settings import Settings
 from .contours import fit_paths
-from .coverage import coverage_of
+from .coverage import coverage_together
 from .external_models.depth import ordered_by_depth
 from .external_models.segmenters import find_depth, find_segmenter
 from .masks import NAME_MAX, Region, check_count, groups_of, resolve
@@ -258,11 +258,7 @@ def _too_coarse(
     details and the width of soft rims. The squared error of coding, in levels of 8 bits, is about
     step**1.5 / 10 (measured on sprites at qualities from 36 to 68).
     """
-    height, width = alpha.shape
-    clear = np.ones(alpha.shape, np.float32)
-    for boundary in boundaries:
-        clear *= 1 - coverage_of(boundary, width, height).reshape(height, width)
-    covered = 1 - clear
+    covered = coverage_together(boundaries, alpha.shape[1], alpha.shape[0])
     if not ((alpha > 0) & (alpha < 1)).any():  # then whole pixels count, not the steps of the rim
         covered = np.rint(covered)
     missed = alpha - covered
