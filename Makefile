@@ -11,7 +11,7 @@ PHOTO := docs/images/photo.png
 	$(BIN)/pip install --quiet -c constraints.txt -e '.[dev]'
 	touch $@
 
-# Enough for `make quick`: what the decoder needs.
+# Enough for `make quick`: what the decoder needs, unless everything is there.
 .venv/light: pyproject.toml constraints.txt setup.py $(wildcard proxyimg_codec/native/*.cpp proxyimg_codec/native/*.h)
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	$(BIN)/pip install --quiet -c constraints.txt setuptools
@@ -32,7 +32,7 @@ tests/web/node_modules/ready: tests/web/package.json
 # The format and its decoder, without encoding anything: less than a minute.
 QUICK := $(addprefix tests/,entropy container geometry texture codec io test_golden.py)
 
-quick: .venv/light
+quick: $(if $(wildcard .venv/ready),.venv/ready,.venv/light)
 	$(BIN)/pytest $(QUICK) -q -m "not encoder and not browser and not data and not slow"
 
 test: .venv/ready tests/web/node_modules/ready
@@ -40,7 +40,7 @@ test: .venv/ready tests/web/node_modules/ready
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache --no-logo
-	$(BIN)/pytest -n auto --dist loadfile
+	$(BIN)/pytest -n auto --dist loadfile --no-loadscope-reorder
 
 # The documentation in site/, without a network. Warnings and links that lead nowhere are errors, unless
 # --quiet hides them.

@@ -9,6 +9,7 @@ import os
 import shutil
 import sys
 import sysconfig
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from setuptools import Extension, setup
@@ -64,11 +65,15 @@ class BuildLevels(build_ext):
 
     def build_extension(self, ext):
         """Compiles each source for each level, and links."""
-        objects = []
-        for level, target in LEVELS.items():
-            for source, maths in (("kernel.cpp", EXACT), ("refine.cpp", FAST), ("train.cpp", FAST)):
-                objects += self._compiled(source, level, [*maths, *target])
-        objects += self._compiled("levels.cpp", next(iter(LEVELS)), next(iter(LEVELS.values())))
+        sources = (("kernel.cpp", EXACT), ("refine.cpp", FAST), ("train.cpp", FAST))
+        todo = [
+            (source, level, [*maths, *target])
+            for level, target in LEVELS.items()
+            for source, maths in sources
+        ]
+        todo.append(("levels.cpp", *next(iter(LEVELS.items()))))
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            objects = list(pool.map(lambda one: self._compiled(*one), todo))
         self.compiler.link_shared_object(
             objects, self.get_ext_fullpath(ext.name), extra_postargs=LINK, target_lang="c++"
         )
@@ -76,9 +81,10 @@ class BuildLevels(build_ext):
     def _compiled(self, source, level, flags):
         folder = str(Path(self.build_temp) / level)
         macros = [("PXI_LEVEL", level)]
-        return self.compiler.compile(
+        [compiled] = self.compiler.compile(
             [str(NATIVE / source)], folder, macros, extra_postargs=[*COMMON, *flags]
         )
+        return compiled
 
 
 class BuildWithDecoder(build_py):

@@ -42,6 +42,24 @@ KINDS = {
 }
 """The marker of the tests of a folder or module, and the packages without which it is skipped."""
 
+LONGEST = (
+    "studio/test_clicks.py",
+    "test_docs.py",
+    "test_spec.py",
+    "texture/test_decoding.py",
+    "encoder/test_threads.py",
+    "conformance/test_make.py",
+    "native/test_wheel.py",
+    "libpxi/test_programs.py",
+    "conformance/test_faults.py",
+    "generate/test_mixture.py",
+    "conformance/test_package_numpy.py",
+    "web/test_wasm.py",
+    "web/test_js_decoder.py",
+    "encoder/shapes/test_layers.py",
+)
+"""Modules that go first, so that in the end no worker waits for another that has one of them."""
+
 
 def kind_of(path: Path) -> tuple[str | None, tuple[str, ...]]:
     """The marker and the packages of a module."""
@@ -70,7 +88,9 @@ def pytest_pycollect_makemodule(module_path, parent):
 
 
 def pytest_collection_modifyitems(items):
-    """Marks tests by where they lie and what they use."""
+    """Marks tests by where they lie and what they use, and puts the longest modules first."""
+    places = {str(TESTS / place): number for number, place in enumerate(LONGEST)}
+    items.sort(key=lambda item: places.get(str(item.path), len(places)))
     reason = lacking(ENCODE)
     for item in items:
         marker = kind_of(item.path)[0]

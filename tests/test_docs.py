@@ -97,37 +97,42 @@ def test_guide_lists_its_pages():
     assert sorted(CHAPTERS) == sorted(p.name for p in GUIDE.glob("*.md") if p.stem != "README")
 
 
+@pytest.fixture(scope="module")
+def encoded(folder):
+    """The folder, with the file that most pages begin with."""
+    launched(["pxi-encode", "photo.png", "--preset", "fast"], folder)
+    return folder
+
+
+def launched(words, folder):
+    """Runs a command as a user does, in a process of its own."""
+    program = [sys.executable, str(ROOT / "bin" / words[0])]
+    done = subprocess.run([*program, *words[1:]], cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, (words, done.stderr)
+
+
 @pytest.mark.parametrize("page", with_blocks("sh"))
-def test_commands_run(page, folder):
+def test_commands_run(page, encoded, tool, monkeypatch):
+    monkeypatch.chdir(encoded)
     assert commands(page)
-    if not (folder / "photo.pxi").exists():
-        run([*tool("pxi-encode"), "photo.png", "--preset", "fast"], folder)
     for words in commands(page):
         force = words[0] in ("pxi-encode", "pxi-edit", "pxi-animate") and "--force" not in words
         # Those of the README run as they are; for the others it is no matter how hard it tries.
         quick = words[0] == "pxi-encode" and page != "README.md" and "-e" not in words
         more = [*(["--force"] if force else []), *(["-e", "1"] if quick else [])]
-        run([*tool(words[0]), *words[1:], *more], folder)
-
-
-def tool(name):
-    return [sys.executable, str(ROOT / "bin" / name)]
-
-
-def run(words, folder):
-    done = subprocess.run(words, cwd=folder, capture_output=True, text=True)
-    assert done.returncode == 0, (words, done.stderr)
+        if page == "README.md":
+            launched([*words, *more], encoded)
+        else:
+            tool(words[0].removeprefix("pxi-"), *words[1:], *more)
 
 
 @pytest.mark.parametrize("page", with_blocks("python"))
-def test_python_blocks_run(page, folder):
-    if not (folder / "photo.pxi").exists():
-        run([*tool("pxi-encode"), "photo.png", "--preset", "fast"], folder)
+def test_python_blocks_run(page, encoded):
     for block in blocks(page, "python"):
         env = {"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin", "OMP_WAIT_POLICY": "PASSIVE"}
         done = subprocess.run(
             [sys.executable, "-W", "error", "-c", block],
-            cwd=folder, env=env, capture_output=True, text=True,
+            cwd=encoded, env=env, capture_output=True, text=True,
         )  # fmt: skip
         assert done.returncode == 0, done.stderr
 

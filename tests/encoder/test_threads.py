@@ -141,17 +141,24 @@ sys.exit(encode.main(sys.argv[1:]))
     not sys.platform.startswith("linux"), reason="the OpenMP of GCC tells how it waits"
 )
 @pytest.mark.parametrize(
-    ("set_by_user", "policy"),
-    [({}, "PASSIVE"), ({"OMP_WAIT_POLICY": "ACTIVE"}, "ACTIVE"), ({"GOMP_SPINCOUNT": "7"}, "7")],
+    ("script", "set_by_user", "policy"),
+    [
+        (ENCODE, {}, "PASSIVE"),
+        (TOOL, {}, "PASSIVE"),
+        (ENCODE, {"OMP_WAIT_POLICY": "ACTIVE"}, "ACTIVE"),
+        (TOOL, {"GOMP_SPINCOUNT": "7"}, "7"),
+    ],
+    ids=["package", "tool", "package, active", "tool, count"],
 )
-def test_threads_wait_without_spinning_unless_somebody_asks_for_it(tmp_path, set_by_user, policy):
+def test_threads_wait_without_spinning_unless_somebody_asks_for_it(
+    tmp_path, script, set_by_user, policy
+):
     (tmp_path / "a.ppm").write_bytes(b"P6 8 8 255 " + bytes(range(192)))
     tool = (tmp_path / "a.ppm", "-e", "1", "--tune", "ms-ssim", "--quiet")
-    for script, args in ((ENCODE, ()), (TOOL, tool)):
-        said = process(script, *args, OMP_DISPLAY_ENV="VERBOSE", **set_by_user)
-        lines = [line.split("=")[1].strip(" '") for line in said.splitlines() if
-                 ("GOMP_SPINCOUNT" if policy == "7" else "OMP_WAIT_POLICY") in line]  # fmt: skip
-        assert lines == [policy]
+    said = process(script, *tool, OMP_DISPLAY_ENV="VERBOSE", **set_by_user)
+    lines = [line.split("=")[1].strip(" '") for line in said.splitlines() if
+             ("GOMP_SPINCOUNT" if policy == "7" else "OMP_WAIT_POLICY") in line]  # fmt: skip
+    assert lines == [policy]
 
 
 @pytest.fixture(params=[2, 3, 5])
