@@ -34,9 +34,6 @@ CURVE_BITS = 8
 CURVE_MAX, SHAPE_MAX = 1 << 15, 1 << 20
 """Bounds of the magnitude of coefficients of curves, and of displacements of shapes."""
 
-MODES_MAX = 64
-"""Most shapes and curves of a layer."""
-
 _VALUE_BITS = 16
 """Fractional bits of the values of curves."""
 

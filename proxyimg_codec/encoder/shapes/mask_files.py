@@ -26,7 +26,6 @@ TYPES = (
 
 _PALETTES = ("P", "PA")
 _COLOUR = ("RGB", "RGBA")
-_ORIENTATION = 0x0112
 _BITS = 258
 """Tag of TIFF: bits a sample."""
 
