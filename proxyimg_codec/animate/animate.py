@@ -97,7 +97,7 @@ def preset(
     for group in groups:
         x0, y0, x1, y1 = zip(*(_box(chosen[i], picture.size) for i in group), strict=True)
         wholes[chosen[group[0]].name] = (min(x0), min(y0), max(x1), max(y1))
-    made = motions.preset(name, wholes, **options)
+    made = motions.preset(name, wholes, canvas=picture.size, **options)
     layers = {chosen[i].name: made.layers[chosen[g[0]].name] for g in groups for i in g}
     return replace(made, layers=layers, together=together)
 

@@ -86,7 +86,7 @@ def falloff(nodes: Real, at: tuple[float, float] | None, radius: float | None) -
 
 
 class Curve:
-    """Curve of a handle: its offset and scale over time.
+    """Curve of a handle: its offset, scale and angle over time.
 
     Args:
         handle: Handle of the motion.
@@ -95,15 +95,15 @@ class Curve:
 
     def __init__(self, handle: motion_types.Handle, period: float | None) -> None:
         self.times = [k.time for k in handle.keys]
-        self.values = np.array([(*k.offset, k.scale) for k in handle.keys])
+        self.values = np.array([(*k.offset, k.scale, k.turn) for k in handle.keys])
         self.smooth = handle.ease == "smooth"
         self.period = period
         if period is not None:
             self.times.append(self.times[0] + period)
             self.values = np.concatenate([self.values, self.values[:1]])
 
-    def at(self, time: float) -> tuple[Real, float]:
-        """Offset float64 [2] in pixels, and scale, at a time in seconds."""
+    def at(self, time: float) -> tuple[Real, Real]:
+        """Offset float64 [2] in pixels, and matrix float64 [2, 2], at a time in seconds."""
         if self.period is not None:
             time = self.times[0] + (time - self.times[0]) % self.period
         after = int(np.searchsorted(self.times, time, side="right"))
@@ -114,4 +114,6 @@ class Curve:
             t = (time - start) / (end - start)
             t = t * t * (3 - 2 * t) if self.smooth else t
             value = self.values[after - 1] + t * (self.values[after] - self.values[after - 1])
-        return value[:2], float(value[2])
+        scale, turn = float(value[2]), math.radians(value[3])
+        c, s = scale * math.cos(turn), scale * math.sin(turn)
+        return value[:2], np.array([[c, -s], [s, c]])

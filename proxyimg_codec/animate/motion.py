@@ -29,7 +29,7 @@ from .motion_types import (
     Spot,
     Wind,
 )
-from .presets import PRESETS, Box
+from .presets import PRESETS, Box, Size
 from .schema import check
 
 __all__ = ["PRESETS", "Attachment", "Box", "Collide", "Disc", "Handle", "Impulse", "Key",
@@ -105,12 +105,15 @@ class Motion:
         return self.frames / self.fps
 
     @staticmethod
-    def read(path: str | Path, boxes: Mapping[str, Box] | None = None) -> Motion:
+    def read(
+        path: str | Path, boxes: Mapping[str, Box] | None = None, canvas: Size | None = None
+    ) -> Motion:
         """Reads a motion file.
 
         Args:
             path: Path of the JSON file.
             boxes: Bounds of the layers of the picture, as for `from_json`.
+            canvas: Width and height of the canvas, as for `from_json`.
 
         Raises:
             InputError: The file cannot be read.
@@ -121,18 +124,21 @@ class Motion:
         except (OSError, UnicodeDecodeError) as error:
             raise InputError(f"{path}: cannot be read: {error}") from None
         try:
-            return Motion.from_json(text, boxes)
+            return Motion.from_json(text, boxes, canvas)
         except UsageError as error:
             raise UsageError(f"{path}: {error}") from None
 
     @staticmethod
-    def from_json(text: str, boxes: Mapping[str, Box] | None = None) -> Motion:
+    def from_json(
+        text: str, boxes: Mapping[str, Box] | None = None, canvas: Size | None = None
+    ) -> Motion:
         """Makes the motion that JSON describes.
 
         Args:
             text: The JSON.
             boxes: Bounds x0, y0, x1, y1 of the layers of the picture in canvas pixels, by name;
                 needed if the JSON names a preset, which completes it.
+            canvas: Width and height of the canvas in pixels; presets pin what it cuts off.
 
         Raises:
             UsageError: The text is not JSON, or not a valid motion; the message says the place.
@@ -143,7 +149,7 @@ class Motion:
             raise UsageError(f"is not valid JSON: {error}") from None
         check(values)
         if "preset" in values:
-            values = presets.filled(values, boxes or {})
+            values = presets.filled(values, boxes or {}, canvas)
             check(values)
         return _motion(values)
 
@@ -172,6 +178,7 @@ def preset(
     loop: bool = True,
     seed: int = 0,
     pins: Sequence[Spot] | None = None,
+    canvas: Size | None = None,
 ) -> Motion:
     """Makes the motion of a preset.
 
@@ -183,12 +190,13 @@ def preset(
         loop: Whether the first frame follows the last.
         seed: Seed of the wind.
         pins: Nodes that do not move, instead of those that the preset pins.
+        canvas: Width and height of the canvas in pixels; the preset pins what it cuts off.
 
     Raises:
         UsageError: There is no such preset, no layer, or a value is out of range.
     """
     common = {"duration": duration, "fps": fps, "loop": loop, "seed": seed}
-    values = presets.preset(name, layers, duration if duration > 0 else 1.0)
+    values = presets.preset(name, layers, duration if duration > 0 else 1.0, canvas)
     motion = {"version": 1, **values, **common}
     if pins is not None:
         for layer in motion["layers"].values():
@@ -225,8 +233,8 @@ def _check_keys(keys: Sequence[Key], motion: Motion, path: str) -> None:
     last = len(keys) - 1
     if times[-1] > end:
         raise UsageError(f"{path}[{last}].time: {times[-1]:g} is after the end at {end:g} s")
-    same = (keys[-1].offset, keys[-1].scale) == (keys[0].offset, keys[0].scale)
-    if motion.loop and times[-1] == end and not same:
+    first, final = ((k.offset, k.scale, k.turn % 360) for k in (keys[0], keys[-1]))
+    if motion.loop and times[-1] == end and first != final:
         raise UsageError(f"{path}[{last}]: a period after the first key it must be equal to it")
 
 

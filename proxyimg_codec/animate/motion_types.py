@@ -58,17 +58,19 @@ class Impulse:
 
 @dataclass(frozen=True)
 class Key:
-    """Place of a handle at a time: it is scaled about its centre, then moved.
+    """Place of a handle at a time: it is turned and scaled about its centre, then moved.
 
     Attributes:
         time: The time.
         offset: Displacement of the handle.
         scale: Factor of distances from its centre.
+        turn: Angle in degrees, clockwise.
     """
 
     time: float
     offset: Pair = (0.0, 0.0)
     scale: float = 1.0
+    turn: float = 0.0
 
 
 @dataclass(frozen=True)

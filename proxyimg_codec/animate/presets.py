@@ -14,7 +14,13 @@ from ..errors import UsageError
 Box = tuple[float, float, float, float]
 """Bounds x0, y0, x1, y1 in canvas pixels."""
 
+Size = tuple[int, int]
+"""Width and height in pixels."""
+
 Values = dict[str, Any]
+
+CUT = 1.0
+"""Distance in pixels from a side of the canvas within which a layer is cut off by it."""
 
 HOP_HEIGHT, HOP_TIME, HOP_EVERY = 0.1, 0.65, 1.3
 """Height of a hop relative to the diagonal, its seconds in the air, and seconds between hops."""
@@ -29,13 +35,18 @@ NUDGE_EVERY = 2.0
 """Seconds from one nudge of the jelly to the next."""
 
 
-def preset(name: str, boxes: Mapping[str, Box], duration: float) -> Values:
+def preset(
+    name: str, boxes: Mapping[str, Box], duration: float, canvas: Size | None = None
+) -> Values:
     """Makes the JSON values of a preset, without the version.
+
+    Sides at which the canvas cuts a layer off are pinned, so that no gap opens there.
 
     Args:
         name: Name of the preset, one of `PRESETS`.
         boxes: Bounds of the layers to move, by name.
         duration: Duration of the motion in seconds, positive.
+        canvas: Width and height of the canvas; None if it cuts nothing off.
 
     Raises:
         UsageError: There is no such preset, or no layer.
@@ -47,15 +58,31 @@ def preset(name: str, boxes: Mapping[str, Box], duration: float) -> Values:
     boxes = {n: (float(a), float(b), float(c), float(d)) for n, (a, b, c, d) in boxes.items()}
     x0, y0, x1, y1 = zip(*boxes.values(), strict=True)
     extent = math.hypot(max(x1) - min(x0), max(y1) - min(y0))
-    return PRESETS[name](boxes, max(extent, 1.0), duration)
+    values = PRESETS[name](boxes, max(extent, 1.0), duration)
+    for key, layer in values["layers"].items():
+        pins = layer.get("pins", [])
+        cut = [] if canvas is None else _cut_off(boxes[key], canvas)
+        if cut:
+            layer["pins"] = [*pins, *(side for side in cut if side not in pins)]
+    return values
 
 
-def filled(values: Mapping[str, Any], boxes: Mapping[str, Box]) -> Values:
+def _cut_off(box: Box, canvas: Size) -> list[str]:
+    """Sides of a layer at which the canvas cuts it off."""
+    (x0, y0, x1, y1), (width, height) = box, canvas
+    gaps = {"top": y0, "bottom": height - y1, "left": x0, "right": width - x1}
+    return [side for side, gap in gaps.items() if gap <= CUT]
+
+
+def filled(
+    values: Mapping[str, Any], boxes: Mapping[str, Box], canvas: Size | None = None
+) -> Values:
     """Completes a motion that names a preset: values of the preset stand for those not given.
 
     Args:
         values: JSON values of the motion.
         boxes: Bounds of the layers of the picture, by name.
+        canvas: Width and height of the canvas, as for `preset`.
 
     Returns:
         JSON values of a motion that names no preset.
@@ -69,7 +96,7 @@ def filled(values: Mapping[str, Any], boxes: Mapping[str, Box]) -> Values:
         known = ", ".join(map(repr, boxes)) or "none"
         raise UsageError(f"layers: there is no layer {', '.join(missing)!r}; there are: {known}")
     chosen = boxes if "*" in named else {n: boxes[n] for n in named}
-    base = preset(values["preset"], chosen, values.get("duration", 4.0))
+    base = preset(values["preset"], chosen, values.get("duration", 4.0), canvas)
     layers = {n: {**v, **named.get(n, named.get("*", {}))} for n, v in base["layers"].items()}
     merged = {"version": 1, **base, **values, "layers": layers}
     if "wind" in base or "wind" in values:
@@ -79,9 +106,10 @@ def filled(values: Mapping[str, Any], boxes: Mapping[str, Box]) -> Values:
 
 
 def _sway(boxes: Mapping[str, Box], extent: float, duration: float) -> Values:
-    """Sways in the wind, pinned at the bottom."""
+    """Sways in the wind, pinned at the bottom, and stays on the canvas."""
     wind = {"strength": 2.1, "scale": extent, "frequency": 0.35, "gust": 0.85, "across": 0.05}
-    return {"wind": wind, "layers": _each(boxes, "hair", "bottom")}
+    layers = _each(boxes, "hair", "bottom")
+    return {"wind": wind, "layers": layers, "collide": {"canvas": True}}
 
 
 def _breeze(boxes: Mapping[str, Box], extent: float, duration: float) -> Values:

@@ -187,8 +187,8 @@ class System:
     def _lead(self, time: float) -> None:
         """Moves the particles that handles lead to their positions at a time in seconds."""
         for curve, centre, at in self.curves:
-            offset, scale = curve.at(time)
-            self.x[:, at] = centre + scale * (self.rest[:, at] - centre) + offset[:, None]
+            offset, matrix = curve.at(time)
+            self.x[:, at] = centre + matrix @ (self.rest[:, at] - centre) + offset[:, None]
 
     def step(self) -> None:
         """Simulates one step, of 1 / (`Motion.fps` * `Motion.steps`) seconds."""

@@ -167,7 +167,7 @@ def motion_of(image: Image, args: argparse.Namespace) -> Motion:
         if getattr(args, name) is not None
     }
     if args.motion:
-        return replace(Motion.read(args.motion, boxes(image)), **given)
+        return replace(Motion.read(args.motion, boxes(image), image.picture.size), **given)
     names = [key(n) for n in args.layer] if args.layer else None
     pins = [spot(text) for text in args.pin] if args.pin else None
     return preset(image, args.preset, names, together=not args.separate, **given, pins=pins)

@@ -25,7 +25,7 @@ from .common import (
 )  # fmt: skip
 from .places import add_files, check_target, default_target, is_stream, parse, same_file
 
-LAYERED = (".ora", ".svg")
+LAYERED = (".ora", ".psd", ".svg")
 """Suffixes of output files that hold layers instead of one flat picture."""
 
 SIGNATURE = "CON-2"
@@ -39,9 +39,9 @@ def arguments() -> argparse.ArgumentParser:
     """Parser of the command line."""
     p = parser("pxi-decode", "Render a .pxi file at any size and region.")
     p.epilog = f"{EXIT_CODES}  {DAMAGED} damaged, but decoded as far as it goes (--tolerant)\n"
-    add_files(p, ".pxi file, or - for standard input", "picture file, type by suffix; .ora writes "
-              "the layers, .svg their outlines; - writes PNG to standard output; IN with the "
-              "suffix .png by default")  # fmt: skip
+    add_files(p, ".pxi file, or - for standard input", "picture file, type by suffix; .ora and "
+              ".psd hold the layers, .svg their outlines; - writes PNG to standard output; IN with "
+              "the suffix .png by default")  # fmt: skip
     add = p.add_argument
     size = p.add_mutually_exclusive_group()
     size.add_argument("--scale", type=float, help="output pixels a canvas pixel")
@@ -336,7 +336,7 @@ def remark(args: argparse.Namespace, output: str, notes: Iterable[str]) -> None:
 
 
 def layered(image: Any, output: str, kind: str, args: argparse.Namespace) -> None:
-    """Writes the layers as OpenRaster, or their outlines as SVG."""
+    """Writes the layers as OpenRaster or for Photoshop, or their outlines as SVG."""
     from ..io.color import COLOUR
     from ..io.files import write_atomically
     from ..io.raster import losses
@@ -350,13 +350,14 @@ def layered(image: Any, output: str, kind: str, args: argparse.Namespace) -> Non
         write_atomically(output, build_svg(image, **wanted))
         remark(args, output, losses(kind, lost))
         return
-    from ..export.openraster import build as build_ora
+    from ..export import openraster, photoshop
 
+    build = photoshop.build if kind == ".psd" else openraster.build
     bar = Bar(len(selected(image, args.layer)), "layers", args.quiet or args.batch)
     try:
         dtype = "uint16" if args.bit_depth == 16 else "uint8"
         limits = limits_of(args)
-        data = build_ora(image, **wanted, dtype=dtype, limits=limits, progress=bar.advance)
+        data = build(image, **wanted, dtype=dtype, limits=limits, progress=bar.advance)
     finally:
         bar.close()
     write_atomically(output, data)

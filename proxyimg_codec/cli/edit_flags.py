@@ -335,8 +335,9 @@ FLAGS = (
         "make a layer out of a part: what a mask holds, or what is found at points, "
         "more with @X,Y, outside of it @!X,Y"),
     Flag("--merge", _merge, ["NAME", "OTHER"], "make one layer of two that show the same planes"),
-    Flag("--complete", _named("complete"), ["NAME"],
-        "continue what is around the hidden parts of a layer, as of what was cut from it"),
+    Flag("--complete", _assigned("complete", "method"), ["NAME[=smooth]"],
+        "continue what is around the hidden parts of a layer, as of what was cut from it, or fill "
+        "them smoothly"),
     Flag("--insert", _insert, ["[NAME=]SOURCE[@X,Y]"],
         "a layer of another file (FILE.pxi:LAYER) or a cut-out picture, in front of all or NAME, "
         "or behind under:NAME; its centre at X,Y"),

@@ -1,23 +1,27 @@
-"""Operation that continues what is around the hidden parts of a layer, as the encoder does.
+"""Operation that says how the hidden parts of a layer are filled.
 
 Files whose hidden parts are filled smoothly, and layers from which others were cut out, get what
-`--background auto` gives. Planes stay as they are: only references are stored.
+`--background auto` gives, or the other way round. Planes stay as they are: references are stored,
+or what is behind is no longer named.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 from ..errors import PxiError, UsageError
-from ..model import Picture
+from ..model import Layer, Picture
 from ..texture.pyramid import PyramidTexture
-from .operations import changed, layer_named, operation
+from .operations import layer_named, operation, substituted
 from .structure import ONE
 
 
-@operation("complete", layer=ONE)
-def complete(picture: Picture, layer: str | int) -> Picture:
-    """Lets the hidden parts of a layer copy places of it that suit, where that is no worse.
+@operation("complete", layer=ONE, method="completion?: exemplar, the default, or smooth")
+def complete(picture: Picture, layer: str | int, method: str = "exemplar") -> Picture:
+    """Lets the hidden parts of a layer copy places of it that suit, or fills them smoothly.
+
+    It copies where that is no worse than filling.
 
     Raises:
         UsageError: The layer has an implicit texture, or nothing of it is hidden.
@@ -29,11 +33,17 @@ def complete(picture: Picture, layer: str | int) -> Picture:
         raise UsageError(f"{said} has an implicit texture, which is continued smoothly by itself")
     if texture.shown is None or (texture.cuts and not texture.cuts.fronts):
         raise UsageError(f"{said} hides nothing: all of it shows")
+    if method == "smooth":
+        stored: dict[str, Any] = {} if texture.matte else {"behind": None, "behind_alpha": None}
+        return _with(picture, chosen, replace(texture, copies=None, **stored))
     try:
         from ..encoder.completion.hidden import copies_of_texture
     except ModuleNotFoundError as error:
         raise PxiError(
             f"complete needs {error.name}: pip install 'proxyimg-codec[encode]'"
         ) from None
-    done = replace(chosen, texture=replace(texture, copies=copies_of_texture(texture)))
-    return changed(picture, [done if v is chosen else v for v in picture.layers])
+    return _with(picture, chosen, replace(texture, copies=copies_of_texture(texture)))
+
+
+def _with(picture: Picture, layer: Layer, texture: PyramidTexture) -> Picture:
+    return substituted(picture, [replace(layer, texture=texture)])

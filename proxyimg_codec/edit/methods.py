@@ -238,9 +238,13 @@ class Editable(Generic[Edited]):
         """
         return self._edited("merge", other=other)
 
-    def completed(self) -> Edited:
-        """Lets the hidden parts of the layer copy places of it that suit; nothing is encoded."""
-        return self._edited("complete")
+    def completed(self, method: str | None = None) -> Edited:
+        """Lets the hidden parts of the layer copy places of it that suit; nothing is encoded.
+
+        Args:
+            method: ``exemplar``, the default, or ``smooth``: they are filled smoothly instead.
+        """
+        return self._edited("complete", method=method)
 
     def duplicated(self, name: str | None = None) -> Edited:
         """Puts a copy in front of the layer, which shares its texture."""

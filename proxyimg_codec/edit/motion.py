@@ -20,6 +20,6 @@ def animate(picture: Picture, motion: Mapping[str, Any]) -> Picture:
         UsageError: The motion is not valid, or does not fit the picture.
         LimitError: Nodes move farther than a file can hold.
     """
-    chosen = Motion.from_json(json.dumps(motion), animation.boxes(picture))
+    chosen = Motion.from_json(json.dumps(motion), animation.boxes(picture), picture.size)
     moving = animation.animate(picture, chosen)
     return changed(moving, list(moving.layers))

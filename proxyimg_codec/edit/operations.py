@@ -60,6 +60,7 @@ KINDS: dict[str, dict[str, Any]] = {
     "flag": {"type": "boolean"},
     "axis": {"enum": ["horizontal", "vertical"]},
     "fit": {"enum": ["box", "shape"]},
+    "completion": {"enum": ["exemplar", "smooth"]},
     "weighting": {"enum": ["sds", "uniform"]},
     "precision": {"enum": ["full", "half", "bfloat"]},
     "colour": {"type": "string", "pattern": "^#[0-9a-fA-F]{6}$"},

@@ -14,7 +14,6 @@ from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..io import xml
 from ..io.color import COLOUR
@@ -23,12 +22,9 @@ from ..limits import DEFAULT_LIMITS, Limits
 from ..model import Layer, Picture, Pictured
 from ..render.cache import Cache
 from ..render.pixels import render
-from .common import at_full_opacity, chosen_layers, opacity_text, region_of
+from .common import Draw, chosen_layers, opacity_text, sheets
 
 THUMBNAIL_SIDE = 256
-
-Draw = Callable[..., NDArray[Any]]
-"""`render.pixels.render` with some arguments bound."""
 
 
 def build(
@@ -75,14 +71,11 @@ def _layers(
     size = {"w": str(width), "h": str(height), "xres": "72", "yres": "72"}
     root = ElementTree.Element("image", {"version": "0.0.5", **size})
     stack = ElementTree.SubElement(root, "stack")
-    full = at_full_opacity(picture)
     parts = {}
-    for k, layer in reversed(list(enumerate(chosen))):
-        region = region_of(picture, layer)
-        pixels, x, y = _cropped(draw(full, layers=[layer.name], region=region))
-        source = f"data/layer{k}.png"
-        parts[source] = encode_png(pixels, _profile(picture))
-        attributes = _attributes(layer, source, region[0] + x, region[1] + y)
+    for k, sheet in enumerate(sheets(picture, chosen[::-1], draw), 1):
+        source = f"data/layer{len(chosen) - k}.png"
+        parts[source] = encode_png(sheet.pixels, _profile(picture))
+        attributes = _attributes(sheet.layer, source, sheet.x, sheet.y)
         ElementTree.SubElement(stack, "layer", attributes)
         progress(1)
     return {**parts, "stack.xml": xml.serialize(root)}
@@ -123,18 +116,6 @@ def _attributes(layer: Layer, source: str, x: int, y: int) -> dict[str, str]:
         "visibility": "hidden" if layer.pose.hidden else "visible",
         "composite-op": "svg:src-over",
     }
-
-
-def _cropped(pixels: NDArray[Any]) -> tuple[NDArray[Any], int, int]:
-    """Smallest rectangle with all pixels that are not transparent, and its x and y."""
-    if pixels.shape[2] == 3:
-        return pixels, 0, 0
-    solid = pixels[..., 3] > 0
-    rows, columns = np.flatnonzero(solid.any(1)), np.flatnonzero(solid.any(0))
-    if not len(rows):
-        return pixels[:1, :1], 0, 0
-    y, x = int(rows[0]), int(columns[0])
-    return pixels[y : rows[-1] + 1, x : columns[-1] + 1], x, y
 
 
 def _zipped(parts: dict[str, bytes]) -> bytes:

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..edit.operations import substituted
 from ..edit.transforms import meshed
 from ..export.common import region_of
 from ..geometry.boundary import Boundary
@@ -30,6 +31,9 @@ from ..render.pixels import render
 Bytes = NDArray[np.uint8]
 Progress = Callable[[int], None]
 Region = tuple[int, int, int, int]
+
+BEYOND = 0.3
+"""Part of a layer's width and height that is shown beyond its outline while that is dragged."""
 
 SKIRT = 6.0
 """Width in canvas pixels of the rim that is drawn around a mesh."""
@@ -101,9 +105,18 @@ def thumbnail(
 
 
 def texture(
-    picture: Picture, index: int, scale: float, limits: Limits, progress: Progress
-) -> tuple[Bytes, Region]:
+    picture: Picture, index: int, scale: float, limits: Limits, progress: Progress,
+    whole: bool = False,
+) -> tuple[Bytes, Region]:  # fmt: skip
     """Draws one layer at rest, without opacity, changed colours or bending.
+
+    Args:
+        picture: The picture.
+        index: Position of the layer.
+        scale: Pixels of the result a canvas pixel.
+        limits: Bounds on drawing.
+        progress: Called with counts of pixels.
+        whole: Whether to draw beyond the outline, too, as far as the canvas goes.
 
     Returns:
         uint8 [H, W, 4] in sRGB, and x, y, width, height in canvas pixels that it covers.
@@ -112,6 +125,10 @@ def texture(
         PxiError: As `render.pixels.render`.
     """
     layer = picture.layers[index]
+    if whole and layer.boundary is not None:
+        layer = replace(layer, boundary=_around(picture, layer))
+        picture = substituted(picture, [layer])
+        layer = picture.layers[index]
     x, y, width, height = box = rest_box(picture, layer)
     on_canvas = min(x, y) >= 0 and x + width <= picture.width and y + height <= picture.height
     pose = Pose(places=layer.pose.places)
@@ -127,6 +144,18 @@ def texture(
         alone, region=region, scale=scale, layers=(index,), limits=limits, progress=progress
     )
     return on_screen(found, picture), box
+
+
+def _around(picture: Picture, layer: Layer) -> Boundary:
+    """Rectangle around a layer at rest and some of what lies beside it on the canvas."""
+    x, y, width, height = rest_box(picture, layer)
+    dx, dy = int(BEYOND * width) + 1, int(BEYOND * height) + 1
+    left, top = min(x, max(x - dx, 0)), min(y, max(y - dy, 0))
+    right = max(x + width, min(x + width + dx, picture.width))
+    bottom = max(y + height, min(y + height + dy, picture.height))
+    corners = [(left, top), (right, top), (right, bottom), (left, bottom)]
+    path = [p for k in range(4) for p in (corners[k], corners[k], corners[(k + 1) % 4])]
+    return Boundary(0, (np.array(path, np.int64),))
 
 
 def rest_box(picture: Picture, layer: Layer) -> Region:

@@ -60,7 +60,9 @@ class DrawingRoutes:
         scale = number_of(query, "scale", 1 / 64, 16) or 1.0
 
         def work(job: Job) -> Response:
-            pixels, box = drawing.texture(picture, index, scale, session.limits, job.advance)
+            pixels, box = drawing.texture(
+                picture, index, scale, session.limits, job.advance, "whole" in query
+            )
             more = {"x-box": ",".join(map(str, box))}
             return pixels_answer(pixels, query.get("format", "raw"), more)
 

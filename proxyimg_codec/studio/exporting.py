@@ -14,7 +14,7 @@ from ..animate.sequence import frames, times
 from ..codec.write import to_bytes
 from ..edit.purge import purged
 from ..errors import UsageError
-from ..export import clip, openraster, svg
+from ..export import clip, openraster, photoshop, svg
 from ..io import raster
 from ..io.color import COLOUR, is_srgb, to_srgb
 from ..io.files import write_atomically
@@ -63,6 +63,7 @@ def export(
         "pxi": lambda: _pxi(picture, asked),
         "svg": lambda: svg.build(picture),
         "ora": lambda: openraster.build(picture, limits=limits, progress=job.advance),
+        "psd": lambda: photoshop.build(picture, limits=limits, progress=job.advance),
         "html": lambda: page_of(content.name, to_bytes(replace(picture, history=()))),
     }
     if isinstance(kind, str) and kind in make:

@@ -38,7 +38,7 @@ def motion_of(picture: Picture, asked: Mapping[str, Any]) -> Motion:
     boxes = animate.boxes(picture)
     if "preset" in values:
         values = _from_preset(picture, values, asked)
-    return Motion.from_json(json.dumps(values), boxes)
+    return Motion.from_json(json.dumps(values), boxes, picture.size)
 
 
 def _from_preset(

@@ -182,7 +182,7 @@ _FLAGS: dict[str, Callable[[Edit], list[str]]] = {
     "shear": _geometry("by"), "affine": _geometry("matrix"), "opacity": _geometry("value"),
     "flip": _flip,
     "drag": _drag, "point": _point, "outlines": lambda e: [_name(e["source"])],
-    "remove": lambda e: [_layer(e)], "complete": lambda e: [_layer(e)],
+    "remove": lambda e: [_layer(e)], "complete": _assigned("method"),
     "hide": lambda e: [_layer(e)], "show": lambda e: [_layer(e)], "still": lambda e: [_layer(e)],
     "duplicate": _assigned("name"), "rename": _assigned("name"), "parent": _assigned("to"),
     "cut": _cut, "merge": lambda e: [_layer(e), _name(e["other"])],

@@ -59,12 +59,14 @@ def test_impulses_fade_towards_their_radius():
 
 @pytest.mark.parametrize("period", [4.0, None])
 def test_curves_meet_their_keys(period):
-    keys = (Key(0.5, (0.0, 0.0)), Key(1.5, (8.0, -4.0), 2.0), Key(2.5, (1.0, 1.0)))
+    keys = (Key(0.5, (0.0, 0.0)), Key(1.5, (8.0, -4.0), 2.0, 90.0), Key(2.5, (1.0, 1.0)))
     for ease in ("linear", "smooth"):
         curve = Curve(Handle((0.0, 0.0), 5.0, keys, ease), period)
         for key in keys:
-            offset, scale = curve.at(key.time)
-            np.testing.assert_allclose([*offset, scale], [*key.offset, key.scale])
+            offset, matrix = curve.at(key.time)
+            np.testing.assert_allclose(offset, key.offset)
+            across = [0, key.scale] if key.turn else [key.scale, 0]  # to the right, or down
+            np.testing.assert_allclose(matrix[:, 0], across, atol=1e-12)
         np.testing.assert_allclose(curve.at(1.0)[0], (4.0, -2.0))
     quarter = curve.at(0.75)[0][0]
     assert quarter == pytest.approx(8 * 0.15625)  # smooth: 3 t^2 - 2 t^3

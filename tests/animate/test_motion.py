@@ -49,7 +49,8 @@ FULL = {
             "impulses": [{"time": 1, "velocity": [0, -80], "at": [3, 4], "radius": 50},
                          {"velocity": [5, 0]}],
             "handles": [{"at": [1, 2], "radius": 30, "ease": "linear",
-                         "keys": [{"time": 0, "offset": [1, 1]}, {"time": 2, "scale": 1.1}]}],
+                         "keys": [{"time": 0, "offset": [1, 1]},
+                                  {"time": 2, "scale": 1.1, "turn": 30}]}],
         },
         "*": {"material": "jelly"},
     },
@@ -88,7 +89,7 @@ def test_json_says_what_the_motion_is():
                 upright=True,
                 impulses=(Impulse((0, -80), 1, (3, 4), 50), Impulse((5, 0))),
                 handles=(
-                    Handle((1, 2), 30, (Key(0, (1, 1)), Key(2, (0, 0), 1.1)), "linear"),
+                    Handle((1, 2), 30, (Key(0, (1, 1)), Key(2, (0, 0), 1.1, 30)), "linear"),
                 ),
             ),
             "*": LayerMotion(MATERIALS["jelly"]),
@@ -247,6 +248,28 @@ def test_a_preset_fills_in_what_is_not_given():
     motion = Motion.from_json(json.dumps(starred), BOXES)
     assert motion.layers["hair"].mass == 3
     assert motion.layers["body"] == every.layers["body"]
+
+
+def test_presets_pin_what_the_canvas_cuts_off():
+    boxes = {"whole": (20.0, 10.0, 60.0, 80.0), "cut": (0.4, 30.0, 50.0, 99.2)}
+    for name in PRESETS:
+        plain, made = preset(name, boxes), preset(name, boxes, canvas=(160, 100))
+        assert made.layers["whole"] == plain.layers["whole"]
+        own = plain.layers["cut"].pins
+        assert made.layers["cut"].pins == (*own, *(s for s in ("bottom", "left") if s not in own))
+        values = json.dumps({"version": 1, "preset": name, "layers": {"cut": {}}})
+        assert {"bottom", "left"} <= {
+            *Motion.from_json(values, boxes, (160, 100)).layers["cut"].pins
+        }
+    assert preset("sway", boxes).collide.canvas
+
+
+def test_a_full_turn_ends_where_it_began():
+    keys = [{"time": 0}, {"time": 1, "turn": 200}, {"time": 3, "turn": 360}]
+    values = changed(["layers", "hair", "handles", 0, "keys"], keys)
+    assert Motion.from_json(json.dumps(values)).layers["hair"].handles[0].keys[-1].turn == 360
+    keys[-1]["turn"] = 350
+    assert "it must be equal to it" in refusal(values)
 
 
 def test_presets_name_what_is_missing():

@@ -210,6 +210,19 @@ def test_handles_lead_and_scale():
     assert np.abs(away[-1, beside]).max() > 1  # the jelly follows
 
 
+def test_handles_turn():
+    keys = (Key(0), Key(0.5, turn=90))
+    layer = LayerMotion(JELLY, ("border",), handles=(Handle((80, 75), 20, keys, "linear"),))
+    body = sheet()
+    away = moved([body], once(layer, duration=0.75))["sheet"]
+    arms = body.nodes - (80, 75)
+    held = np.hypot(*arms.T) <= 20
+    for frame, angle in ((6, np.pi / 4), (12, np.pi / 2)):
+        c, s = np.cos(angle), np.sin(angle)
+        turned = np.stack([c * arms[:, 0] - s * arms[:, 1], s * arms[:, 0] + c * arms[:, 1]], 1)
+        np.testing.assert_allclose(away[frame, held], (turned - arms)[held], atol=1e-9)
+
+
 def test_breathing_loops():
     keys = (Key(0), Key(1, scale=1.2))
     layer = LayerMotion(JELLY, ("border",), handles=(Handle((80, 75), 25, keys),))

@@ -41,6 +41,8 @@ def test_what_was_filled_smoothly_goes_on_and_nothing_else_changes(striped):
              for old, new in zip(state(image), state(completed), strict=True)]  # fmt: skip
     assert [kind for kind, same in kinds if not same] == ["TEXR"]
     assert completed.undone().to_bytes() == image.to_bytes()
+    smooth = completed.layers["back"].completed("smooth").layers["ball"].removed()
+    np.testing.assert_array_equal(smooth.render(), before)
 
 
 def test_layers_that_hide_nothing_are_refused(striped):

@@ -12,7 +12,7 @@ from proxyimg_codec.export import openraster
 from proxyimg_codec.geometry.boundary import Boundary
 from proxyimg_codec.io.raster import parse
 from proxyimg_codec.model import Layers
-from tests.support.images import changed
+from tests.support.images import changed, posed
 from tests.support.pictures import smooth
 
 pytest.importorskip("OpenImageIO")
@@ -96,7 +96,7 @@ def test_what_is_hidden_is_there(image):
 
 
 def test_source_over_gives_the_picture(image):
-    for picture in (image, shown(image, bar={"opacity": 20000}, disc={"hidden": True})):
+    for picture in (image, posed(image, bar={"opacity": 20000}, disc={"hidden": True})):
         got = composited(openraster.build(picture), 64, 48)
         assert np.abs(got - premultiplied(picture.render())).max() < 1.5 / 255
         deep = composited(openraster.build(picture, dtype=np.uint16), 64, 48)
@@ -112,25 +112,19 @@ def test_source_over_gives_a_picture_with_soft_alpha():
     assert np.abs(got - premultiplied(image.render())).max() < 1.5 / 255
 
 
-def shown(image: pxi.Image, **poses) -> pxi.Image:
-    layers = [
-        changed(v, pose=changed(v.pose, **poses.get(v.name, {})), name=v.name) for v in image.layers
-    ]
-    return changed(image, layers=Layers(layers))
-
-
 def test_opacity_and_visibility_are_attributes(image):
     plain = layers_of(openraster.build(image))
-    posed = layers_of(openraster.build(shown(image, bar={"opacity": 32768}, disc={"hidden": True})))
-    seen = {a["name"]: (a["opacity"], a["visibility"]) for a, _ in posed}
+    changed_image = posed(image, bar={"opacity": 32768}, disc={"hidden": True})
+    other = layers_of(openraster.build(changed_image))
+    seen = {a["name"]: (a["opacity"], a["visibility"]) for a, _ in other}
     assert seen["back"] == ("1", "visible")
     assert seen["disc"] == ("1", "hidden")
     assert round(float(seen["bar"][0]) * 65535) == 32768
-    assert all((a == b).all() for (_, a), (_, b) in zip(plain, posed, strict=True))
+    assert all((a == b).all() for (_, a), (_, b) in zip(plain, other, strict=True))
 
 
 def test_nothing_visible_is_an_empty_picture(image):
-    hidden = shown(image, **{n: {"hidden": True} for n in ("bar", "disc")})
+    hidden = posed(image, **{n: {"hidden": True} for n in ("bar", "disc")})
     parts = unzip(openraster.build(hidden, layers=["bar", "disc"]))
     assert not parse(parts["mergedimage.png"], "a.png").pixels.any()
     assert parse(parts["mergedimage.png"], "a.png").pixels.shape == (48, 64, 4)

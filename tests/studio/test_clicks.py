@@ -1,5 +1,9 @@
-"""All that a newcomer does with the studio, by mouse and keyboard in a real browser."""
+"""All that people do with the studio, by mouse, fingers and keyboard in a real browser.
 
+`test_a_newcomer_does_everything_once` is one way through all of it, by one who was told nothing.
+"""
+
+import io
 import json
 
 import numpy as np
@@ -7,7 +11,8 @@ import pytest
 from PIL import Image
 
 import proxyimg_codec as pxi
-from tests.support.studio import CHROMIUM, opened, served
+from proxyimg_codec.export import photoshop
+from tests.support.studio import CHROMIUM, chromium, opened, served
 
 pytest.importorskip("playwright.sync_api", reason="not installed: playwright")
 
@@ -16,8 +21,14 @@ pytestmark = [
     pytest.mark.slow,
 ]
 
-SIZE = (381, 254)
-RED, BLUE, EMPTY = (270, 190), (100, 190), (30, 20)
+EXPORTED = """fetch("/api/export?wait", { method: "POST", body: '{"kind": "html"}',
+  headers: { "Content-Type": "application/json" } }).then((answer) => answer.json())
+  .then((made) => fetch(made.result.url)).then((answer) => answer.text())"""
+
+BOX = "document.querySelector('.overlay polygon.box').getBoundingClientRect().toJSON()"
+
+SIZE = (261, 174)
+RED, BLUE, EMPTY = (185, 130), (68, 130), (20, 14)
 """Points of the canvas: in the red parrot, in the other one, and in what lies behind."""
 
 
@@ -34,324 +45,478 @@ def photo(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def layered(photo):
-    """The same with three layers, encoded."""
-    pixels = np.asarray(Image.open(photo))
-    regions = pxi.find_layers(pixels, points={"red": [RED], "blue": [BLUE, (75, 95)]})
-    path = photo.with_suffix(".pxi")
-    pxi.encode(pixels, masks=regions, effort=1).save(path)
-    return path
+def studio_at(tmp_path_factory):
+    """One server and one browser for all tests: studio_at() -> page with nothing open."""
+    with served(tmp_path_factory.mktemp("kept")) as address, chromium() as browser:
+        yield lambda **more: opened(browser, address, **more)
 
 
-def test_from_a_dropped_photograph_to_a_saved_file(photo, tmp_path):
-    with served(tmp_path / "kept") as address, opened(address, tmp_path) as studio:
-        page = studio.page
-        studio.shoot("1-empty")
-        studio.drop(photo)
-        studio.until("studio.store.state.regions?.length > 1")
-        page.wait_for_timeout(300)
-        studio.shoot("2-found")
-        page.click("#got-it")
-
-        # A thing that was found gets a name in the list.
-        studio.click(*RED)
-        name = studio.ask("[...studio.store.selected][0]")
-        studio.row(name).locator(".name").dblclick()
-        studio.after(lambda: studio.type("red parrot"))
-        # One that was not is pointed at, and named on the spot.
-        for region in studio.state["regions"]:
-            if region["name"] not in ("back", "red parrot"):
-                studio.after(studio.row(region["name"]).get_by_label("Remove").click)
-        page.keyboard.press("Escape")
-        studio.after(lambda: studio.click(*BLUE))
-        page.wait_for_selector(".christen input")
-        studio.shoot("3-named")
-        studio.after(lambda: studio.type("blue parrot"))
-        assert {r["name"] for r in studio.state["regions"]} == {"back", "red parrot", "blue parrot"}
-
-        page.click("#encode")
-        page.wait_for_selector(".encoding progress")
-        studio.shoot("4-encoding")
-        studio.until("studio.store.state.stage === 'editing'")
-        page.click("#got-it")
-        studio.until("studio.ready()")
-
-        # Pulled, bent, undone, redone.
-        studio.click(*RED)
-        studio.after(lambda: studio.drag(RED, (RED[0] - 40, RED[1] - 10)))
-        page.wait_for_selector(".exact:not([hidden])")
-        studio.shoot("5-moved")
-        first = studio.state["history"][0]["op"]
-        assert (first["op"], first["by"]) == ("move", pytest.approx([-40, -10], abs=1))
-        studio.after(page.locator("#undo").click)
-        studio.after(page.locator("#redo").click)
-
-        # What another one hid appears when that is removed.
-        studio.click(*BLUE)
-        studio.after(lambda: studio.press("Delete"))
-        assert "blue parrot removed" in studio.said
-        studio.shoot("6-removed")
-        with page.expect_download() as download:
-            page.click("#save")
-        saved = download.value.path().read_bytes()
-        state = json.loads(studio.ask("fetch('/api/state').then((answer) => answer.text())"))
-
+def test_a_newcomer_does_everything_once(studio_at, photo, tmp_path, monkeypatch):
+    with studio_at() as studio:
+        open_and_point(studio, photo)
+        correct_regions(studio)
+        make_editable(studio)
+        pull(studio)
+        bend(studio)
+        shape(studio)
+        use_the_list(studio, photo)
+        fill_what_was_removed(studio)
+        animate(studio)
+        go_back_and_forth(studio)
+        export(studio)
+        saved, edits = save(studio)
     image = pxi.from_bytes(saved)
-    assert [layer.name for layer in image.layers] == ["back", "red parrot"]
-    edits = [step["op"] for step in state["history"]]
-    assert [e["op"] for e in edits] == ["move", "remove"]
-    assert image.undone(2).edited(*edits).to_bytes() == saved
+    monkeypatch.chdir(photo.parent)  # edits name the picture that was added
+    assert image.undone(len(edits)).edited(*edits).to_bytes() == saved
 
 
-def test_pointing_tools(photo, tmp_path):
-    with served(tmp_path / "kept", str(photo)) as address, opened(address, tmp_path) as studio:
-        page = studio.page
+def open_and_point(studio, photo):
+    page = studio.page
+    studio.look("1-empty")
+    studio.drop(photo)
+    studio.until("studio.store.state.found")
+    studio.look("2-found")
+    page.click("#got-it")
 
-        def regions():
-            return {r["name"]: r for r in studio.state["regions"] if not r["back"]}
-
-        def made(action):
-            before = set(regions())
-            studio.after(action)
-            page.wait_for_selector(".christen input")
-            page.keyboard.press("Escape")
-            (name,) = set(regions()) - before
-            return name
-
-        studio.until("studio.store.state.regions?.length > 1")
-        page.click("#got-it")
-        for name in regions():
-            studio.after(studio.row(name).get_by_label("Remove").click)
-        studio.press("r")
-        boxed = made(lambda: studio.drag((195, 50), (378, 250)))
-        studio.press("s")
-        scribbled = made(lambda: studio.drag((90, 170), (110, 230)))
-        studio.shoot("20-pointing")
-
-        # Brush and eraser are exact: they change the chosen one, where they go.
-        def area(name):
-            return regions()[name]["area"]
-
-        before = area(scribbled)
-        studio.press("b")
-        studio.after(lambda: studio.drag((20, 200), (50, 200)))
-        grown = area(scribbled)
-        assert grown > before
-        studio.press("e")
-        studio.after(lambda: studio.drag((20, 200), (50, 200)))
-        assert area(scribbled) == pytest.approx(before, abs=2)
-        studio.after(lambda: studio.press("Control+z"))
-        assert area(scribbled) == grown
-        studio.row(boxed).click()
-        studio.row(scribbled).click(modifiers=["Control"])
-        studio.after(page.get_by_role("button", name="Merge both").click)
-        assert len(regions()) == 1
+    # What was found gets a name in the list, or goes.
+    studio.click(*RED)
+    name = studio.ask("[...studio.store.selected][0]")
+    studio.row(name).locator(".name").dblclick()
+    studio.after(lambda: studio.type("red"))
+    for region in studio.state["regions"]:
+        if region["name"] not in ("back", "red"):
+            studio.after(studio.row(region["name"]).get_by_label("Remove").click)
+    # What was not found is pointed at, and named on the spot.
+    page.keyboard.press("Escape")
+    studio.after(lambda: studio.click(*BLUE))
+    page.wait_for_selector(".christen input")
+    studio.look("3-named")
+    studio.after(lambda: studio.type("blue"))
+    assert {r["name"] for r in studio.state["regions"]} == {"back", "red", "blue"}
 
 
-def test_tools_of_the_canvas(layered, tmp_path):
-    with served(tmp_path / "kept", str(layered)) as address, opened(address, tmp_path) as studio:
-        page = studio.page
-        page.click("#got-it")
-        studio.until("studio.ready()")
-        studio.click(*RED)
-        assert studio.ask("[...studio.store.selected]") == ["red"]
-        assert "red" in page.locator(".layer.on").inner_text()
-        page.wait_for_selector(".overlay .handle")
+def correct_regions(studio):
+    """Box and scribble make regions, scissors split them; brush and eraser are exact."""
 
-        # Corner, side with Ctrl, knob: scale, shear, rotate.
-        def box():
-            return page.locator(".overlay polygon.box").bounding_box()
+    def regions():
+        return {r["name"]: r["area"] for r in studio.state["regions"] if not r["back"]}
 
-        def pull(x, y, dx, dy, *keys):
-            for key in keys:
-                page.keyboard.down(key)
-            page.mouse.move(x, y)
-            page.mouse.down()
-            page.mouse.move(x + dx, y + dy, steps=6)
-            page.mouse.up()
-            for key in keys:
-                page.keyboard.up(key)
-
-        def kept(action):
-            count = studio.state["at"]
-            studio.after(action)
-            page.wait_for_timeout(150)
-            return [step["op"] for step in studio.state["history"][count:]]
-
-        b = box()
-        (scaled,) = kept(lambda: pull(b["x"], b["y"], 30, 20))
-        assert scaled["op"] == "scale"
-        assert scaled["by"][0] == pytest.approx(scaled["by"][1])
-        assert scaled["by"][0] < 1
-        studio.after(lambda: studio.press("Control+z"))
-        page.wait_for_timeout(150)
-        b = box()
-        (slanted,) = kept(lambda: pull(b["x"] + b["width"] / 2, b["y"], 25, 0, "Control"))
-        assert slanted["op"] == "shear"
-        assert slanted["by"][0] != 0
-        studio.after(lambda: studio.press("Control+z"))
-        page.wait_for_timeout(150)
-        b = box()
-        (turned,) = kept(lambda: pull(b["x"] + b["width"] / 2, b["y"] - 24, 60, 10, "Shift"))
-        assert turned["op"] == "rotate"
-        assert turned["degrees"] % 15 == 0
-        assert turned["degrees"] > 0
-        (nudged,) = kept(lambda: (studio.press("ArrowLeft"), studio.press("Shift+ArrowUp")))
-        assert (nudged["op"], nudged["by"]) == ("move", [-1, -10])
-        studio.shoot("7-turned")
-
-        # Pins: three are set, one of them is dragged; the outline follows.
-        page.click("#tool-pins")
-        x0, y0, x1, y1 = next(v["bounds"] for v in studio.state["layers"] if v["name"] == "red")
-        x, y, width, height = x0, y0, x1 - x0, y1 - y0
-        studio.until("document.querySelector('.overlay .mesh')")
-        for u, v in ((0.35, 0.9), (0.6, 0.85), (0.5, 0.2)):
-            studio.click(x + u * width, y + v * height)
-        studio.until("document.querySelectorAll('.overlay .pin').length === 3")
-        start = (x + 0.5 * width, y + 0.2 * height)
-        (bent,) = kept(lambda: studio.drag(start, (start[0] - 30, start[1] - 10)))
-        assert bent["op"] == "drag"
-        assert len(bent["handles"]) == 3
-        assert [h[2:] == [0, 0] for h in bent["handles"]] == [True, True, False]
-        studio.shoot("8-bent")
-
-        # Points of the outline.
-        studio.press("b")
-        studio.until("document.querySelectorAll('.overlay .handle').length > 3")
-        handle = page.locator(".overlay .handle").first.bounding_box()
-        middle = (handle["x"] + handle["width"] / 2, handle["y"] + handle["height"] / 2)
-        moved = kept(lambda: pull(*middle, 12, 9))
-        assert {e["op"] for e in moved} == {"point"}
-        assert len(moved) == 3
-        studio.shoot("9-points")
-        studio.press("v")
-
-        # A part is cut out; a name is typed; the code and the history show it all.
-        page.click("#tab-history")
-        steps = page.locator(".step")
-        assert steps.count() == studio.state["at"] + 1
-        studio.shoot("10-history")
-        studio.after(steps.nth(1).click)
-        assert studio.state["at"] == 1
-        page.click("#tab-code")
-        assert "--rotate" in page.locator("pre").first.inner_text()
-        studio.shoot("11-code")
-
-
-def test_layers_in_the_list(layered, tmp_path):
-    with served(tmp_path / "kept", str(layered)) as address, opened(address, tmp_path) as studio:
-        page = studio.page
-        page.click("#got-it")
-        studio.until("studio.ready()")
-
-        def layers():
-            return [layer["name"] for layer in studio.state["layers"]]
-
-        def pull(start, end):
-            a, b = start.bounding_box(), end.bounding_box()
-            page.mouse.move(a["x"] + a["width"] / 2, a["y"] + a["height"] / 2)
-            page.mouse.down()
-            page.mouse.move(b["x"] + b["width"] / 2, b["y"] + b["height"] - 3, steps=6)
-            page.mouse.up()
-
-        front, behind = layers()[:0:-1]
-        studio.after(lambda: pull(studio.row(front).locator(".name"), studio.row(behind)))
-        assert layers() == ["back", front, behind]
-        studio.after(studio.row("red").get_by_label("Hide").click)
-        assert next(v for v in studio.state["layers"] if v["name"] == "red")["hidden"]
-        studio.after(studio.row("red").get_by_label("Show").click)
-        studio.row("red").get_by_label("Lock").click()
-        studio.click(*RED)
-        assert studio.ask("[...studio.store.selected]") == ["back"]
-        studio.row("red").get_by_label("Unlock").click()
-
-        # The texture of one on the other, and another colour.
-        studio.after(lambda: pull(studio.row("blue").locator(".thumb"), studio.row("red")))
-        assert studio.state["history"][-1]["op"]["op"] == "texture"
-        studio.click(*RED)
-        studio.ask("document.activeElement.blur()")
-        page.get_by_label("Hue").focus()
-        studio.after(lambda: studio.press("PageUp"))
-        assert studio.state["history"][-1]["op"]["op"] == "recolour"
-        page.get_by_label("Opacity", exact=True).focus()
-        studio.after(lambda: studio.press("PageDown"))
-        assert studio.state["history"][-1]["op"]["op"] == "opacity"
-
-        # Two become a group, and are named.
+    def made(action):
+        before = set(regions())
+        studio.after(action)
+        studio.page.wait_for_selector(".christen input")
         studio.press("Escape")
-        page.locator(".stage").focus()
-        studio.press("Control+a")
-        studio.after(lambda: studio.press("Control+g"))
-        studio.after(lambda: studio.type("birds"))
-        assert [g["name"] for g in studio.state["groups"]] == ["birds"]
+        (name,) = set(regions()) - before
+        return name
+
+    studio.press("s")
+    scribbled = made(lambda: studio.drag((20, 20), (60, 14)))
+    studio.press("r")
+    boxed = made(lambda: studio.drag((135, 35), (258, 170)))
+    studio.look("4-pointing")
+    for name in (scribbled, boxed):
         studio.after(lambda: studio.press("Control+z"))
-        studio.shoot("12-list")
+        assert name in regions() or name == boxed
+    studio.row("blue").click()
+    before = regions()["blue"]
+    studio.press("b")
+    studio.after(lambda: studio.drag((20, 30), (40, 30)))
+    assert regions()["blue"] > before
+    studio.press("e")
+    studio.after(lambda: studio.drag((20, 30), (40, 30)))
+    assert regions()["blue"] == pytest.approx(before, abs=2)
+    studio.press("x")
+    part = made(lambda: studio.click(205, 55))
+    assert part.startswith("red")
+    studio.row("red").click()
+    studio.row(part).click(modifiers=["Control"])
+    studio.after(studio.page.get_by_role("button", name="Merge both").click)
+    assert set(regions()) == {"red", "blue"}
 
-        # What is wrong is said in place.
-        studio.row("red").locator(".name").dblclick()
-        studio.type("blue")
-        studio.until("document.querySelector('.message.error:not([hidden])')")
-        assert "blue" in studio.said
-        studio.shoot("13-error")
+
+def make_editable(studio):
+    page = studio.page
+    page.locator(".encoding input").nth(1).focus()
+    studio.press("Home")  # the least effort
+    page.click("#encode")
+    page.wait_for_selector(".encoding progress")
+    studio.until("studio.store.state.stage === 'editing'")
+    studio.hears("pixels in")
+    page.click("#got-it")
+    studio.until("studio.ready()")
 
 
-def test_motion(layered, tmp_path):
-    with served(tmp_path / "kept", str(layered)) as address, opened(address, tmp_path) as studio:
-        page = studio.page
-        page.click("#got-it")
-        studio.until("studio.ready()")
-        page.click("#mode-motion")
-        page.get_by_role("button", name="Sway").click()
-        studio.until("studio.player.running && studio.player.time > 0.2")
-        studio.press(" ")
-        studio.until("!studio.player.running")
-        studio.shoot("14-motion")
-        page.get_by_role("button", name="Left", exact=True).click()
-        page.click("#tool-keep")
-        studio.click(*RED)
-        studio.until("!studio.player.busy")
-        studio.press("v")
+def kept(studio, action):
+    """Edits that an action makes."""
+    count = studio.state["at"]
+    studio.after(action)
+    studio.page.wait_for_timeout(120)
+    return [step["op"] for step in studio.state["history"][count:]]
 
-        # A handle with a key: at half a second it is dragged.
-        page.click("#tool-handle")
-        studio.click(RED[0], RED[1] - 60)
-        ruler = page.locator(".tracks").bounding_box()
-        page.mouse.click(ruler["x"] + ruler["width"] / 8, ruler["y"] + 12)
-        studio.drag((RED[0], RED[1] - 60), (RED[0] - 15, RED[1] - 70))
-        studio.until("document.querySelectorAll('.tracks .key').length === 2")
-        studio.until("studio.player.running && !studio.player.busy")
-        studio.press(" ")
-        page.get_by_label("Onion skin").click()
-        page.wait_for_timeout(100)
-        studio.shoot("15-keys")
-        studio.after(page.locator("#keep-motion").click)
-        kept = studio.state["history"][-1]["op"]
-        assert kept["op"] == "animate"
-        assert len(kept["motion"]["layers"]["red"]["handles"][0]["keys"]) == 2
-        assert studio.state["timeline"]["seconds"] == 4
 
-        # A clip of it.
-        page.click("#mode-edit")
-        page.click("#export")
-        page.locator(".kind", has_text="GIF").click()
-        studio.shoot("16-export")
+def stroke(studio, x, y, dx, dy, *keys):
+    """Drags from a place of the window, with keys held."""
+    mouse, keyboard = studio.page.mouse, studio.page.keyboard
+    for key in keys:
+        keyboard.down(key)
+    mouse.move(x, y)
+    mouse.down()
+    mouse.move(x + dx, y + dy, steps=5)
+    mouse.up()
+    for key in keys:
+        keyboard.up(key)
+
+
+def pull(studio):
+    """The box of a layer: moves, scales, turns, slants; by numbers and arrow keys, too."""
+    page = studio.page
+    page.mouse.move(*studio.at(*RED))
+    studio.until("studio.store.hovered === 'red'")
+    studio.click(*RED)
+    assert studio.ask("[...studio.store.selected]") == ["red"]
+    (moved,) = kept(studio, lambda: studio.drag(RED, (RED[0] - 30, RED[1] - 8)))
+    assert (moved["op"], moved["by"]) == ("move", pytest.approx([-30, -8], abs=1))
+    page.wait_for_selector(".exact:not([hidden])")
+    studio.look("5-moved")
+
+    def box():
+        return studio.ask(BOX)
+
+    def undo():
+        studio.after(lambda: studio.press("Control+z"))
+        page.wait_for_timeout(120)
+
+    b = box()
+    (scaled,) = kept(studio, lambda: stroke(studio, b["x"], b["y"], 30, 20))
+    assert scaled["op"] == "scale"
+    assert scaled["by"][0] == pytest.approx(scaled["by"][1])
+    assert scaled["by"][0] < 1
+    undo()
+    (freely,) = kept(studio, lambda: stroke(studio, b["x"], b["y"], 30, 2, "Shift", "Alt"))
+    assert freely["by"][0] < freely["by"][1]
+    undo()
+    slant = kept(studio, lambda: stroke(studio, b["x"] + b["width"] / 2, b["y"], 25, 0, "Control"))
+    assert [edit["op"] for edit in slant] == ["shear"]
+    undo()
+    knob = (b["x"] + b["width"] / 2, b["y"] - 24)
+    (turned,) = kept(studio, lambda: stroke(studio, *knob, 60, 10, "Shift"))
+    assert turned["op"] == "rotate"
+    assert turned["degrees"] > 0 == turned["degrees"] % 15
+    (nudged,) = kept(studio, lambda: (studio.press("ArrowLeft"), studio.press("Shift+ArrowUp")))
+    assert (nudged["op"], nudged["by"]) == ("move", [-1, -10])
+    number = page.get_by_label("X", exact=True)
+    number.fill(str(float(number.input_value()) + 7))
+    (typed,) = kept(studio, lambda: number.press("Enter"))
+    assert typed["by"] == pytest.approx([7, 0], abs=0.1)
+
+
+def bend(studio):
+    """Pins: three are set, one is dragged, weighed and turned."""
+    page = studio.page
+    page.click("#tool-pins")
+    x0, y0, x1, y1 = next(v["bounds"] for v in studio.state["layers"] if v["name"] == "red")
+    studio.until("document.querySelector('.overlay .mesh')")
+    spots = [
+        (x0 + u * (x1 - x0), y0 + v * (y1 - y0)) for u, v in ((0.35, 0.9), (0.6, 0.85), (0.5, 0.2))
+    ]
+    for spot in spots:
+        studio.click(*spot)
+    studio.until("document.querySelectorAll('.overlay .pin').length === 3")
+    x, y = spots[2]
+    (bent,) = kept(studio, lambda: studio.drag((x, y), (x - 20, y - 6)))
+    assert bent["op"] == "drag"
+    assert [h[2:] == [0, 0] for h in bent["handles"]] == [True, True, False]
+    page.get_by_label("Weight").focus()
+    for _ in range(8):
+        studio.press("ArrowRight")
+    studio.until("document.querySelectorAll('.overlay .reach').length === 1")
+    page.get_by_label("Turn").focus()
+    (turned,) = kept(studio, lambda: studio.press("PageUp"))
+    assert len(turned["handles"]) > 3
+    studio.look("6-bent")
+
+
+def shape(studio):
+    """Points of the outline: dragged, what is in it follows; corners become smooth."""
+    page = studio.page
+    studio.press("b")
+    studio.until("document.querySelectorAll('.overlay .handle').length > 3")
+    page.wait_for_timeout(300)
+
+    x, y = studio.middle(".overlay circle.handle")
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 14, y + 9, steps=4)
+    assert studio.ask("studio.preview('red').clip !== undefined")
+    studio.look("7-points")
+    moved = kept(studio, page.mouse.up)
+    assert {e["op"] for e in moved} == {"point"}
+    assert len(moved) == 3
+    page.get_by_label("The inside goes along").check()
+    x, y = studio.middle(".overlay circle.handle")
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x - 8, y + 3, steps=4)
+    assert studio.ask("studio.preview('red').bent.length > 20")
+    along = kept(studio, page.mouse.up)
+    assert along
+    assert all(edit["follow"] for edit in along)
+    corner = page.get_by_role("button", name="Corner", exact=True)
+    assert {e["op"] for e in kept(studio, corner.click)} == {"point"}
+    studio.press("v")
+
+
+def use_the_list(studio, photo):
+    """Order, eye, lock, textures of others and of files, colours, names, groups, parents."""
+    page = studio.page
+
+    def layers():
+        return [layer["name"] for layer in studio.state["layers"]]
+
+    def carry(start, end):
+        a, b = start.bounding_box(), end.bounding_box()
+        page.mouse.move(a["x"] + a["width"] / 2, a["y"] + a["height"] / 2)
+        page.mouse.down()
+        page.mouse.move(b["x"] + b["width"] / 2, b["y"] + b["height"] - 3, steps=5)
+        page.mouse.up()
+
+    front, behind = layers()[:0:-1]
+    studio.after(lambda: carry(studio.row(front).locator(".name"), studio.row(behind)))
+    assert layers() == ["back", front, behind]
+    for label, hidden in (("Hide", True), ("Show", False)):
+        studio.after(studio.row("red").get_by_label(label).click)
+        assert next(v for v in studio.state["layers"] if v["name"] == "red")["hidden"] is hidden
+    studio.row("blue").get_by_label("Lock").click()
+    studio.click(*BLUE)
+    assert studio.ask("[...studio.store.selected]") != ["blue"]
+    studio.row("blue").get_by_label("Unlock").click()
+
+    def last():
+        return studio.state["history"][-1]["op"]
+
+    studio.after(lambda: carry(studio.row("blue").locator(".thumb"), studio.row("red")))
+    assert (last()["op"], last()["source"]) == ("texture", "blue")
+    studio.after(lambda: studio.press("Control+z"))
+    thumb = studio.row("red").locator(".thumb").bounding_box()
+    version = studio.state["version"]
+    studio.drop(photo, (thumb["x"] + 9, thumb["y"] + 9))
+    studio.until(f"studio.store.state.version > {version} && !studio.store.state.busy")
+    studio.until("studio.store.state.history.at(-1).op.source === 'parrots.png'")
+    studio.row("red").click()
+    for label, key, op in (("Hue", "PageUp", "recolour"), ("Opacity", "PageDown", "opacity")):
+        page.get_by_label(label, exact=True).focus()
+        studio.after(lambda key=key: studio.press(key))
+        assert last()["op"] == op
+    studio.after(lambda: studio.press("Control+d"))
+    assert "red copy" in layers()
+    studio.row("red copy").locator(".name").dblclick()
+    studio.after(lambda: studio.type("twin"))
+    page.get_by_label("Follows").select_option("red")
+    studio.until("studio.store.state.history.at(-1).op.op === 'parent'")
+    studio.row("blue").click(modifiers=["Control"])
+    studio.after(lambda: studio.press("Control+g"))
+    studio.after(lambda: studio.type("birds"))
+    assert [g["name"] for g in studio.state["groups"]] == ["birds"]
+    studio.look("8-list")
+    # What is wrong is said in place.
+    studio.row("red").locator(".name").dblclick()
+    studio.type("blue")
+    studio.hears("blue")
+    assert studio.page.locator(".message.error").is_visible()
+    studio.look("9-error")
+
+
+def fill_what_was_removed(studio):
+    page = studio.page
+    studio.row("blue").click()
+    studio.after(lambda: studio.press("Delete"))
+    studio.hears("blue removed")
+    studio.look("10-removed")
+    for label, edits in (("Smooth", ["complete"]), ("Surroundings", ["complete"])):
+        at = studio.state["at"]
+        page.locator(".message").get_by_role("button", name=label).click()
+        studio.until("studio.store.state.history.at(-1).op.op === 'complete'")
+        studio.until(f"'{label}' === 'Smooth' || !studio.store.state.history.at(-1).op.method")
+        assert [s["op"]["op"] for s in studio.state["history"][at:]] in (edits, [])
+
+
+def animate(studio):
+    """A preset, pins, a handle with keys of place, size and angle, onion skin; it is kept."""
+    page = studio.page
+    page.click("#mode-motion")
+    studio.press("Escape")
+    studio.row("red").click()
+    page.get_by_role("button", name="Sway").click()
+    studio.until("studio.player.running && studio.player.time > 0.2")
+    studio.look("11-motion")
+    page.locator(".stage").focus()
+    studio.press(" ")
+    studio.until("!studio.player.running")
+    page.get_by_role("button", name="Left", exact=True).click()
+    page.click("#tool-keep")
+    b = next(v["bounds"] for v in studio.state["layers"] if v["name"] == "red")
+    middle = ((b[0] + b[2]) / 2, (b[1] + b[3]) / 2)
+    studio.click(middle[0], middle[1] + 20)
+    studio.until("studio.player.running && !studio.player.busy")
+    page.click("#tool-handle")
+    studio.click(middle[0], middle[1] - 30)
+    ruler = page.locator(".tracks").bounding_box()
+    page.mouse.click(ruler["x"] + ruler["width"] / 8, ruler["y"] + 12)
+    studio.drag((middle[0], middle[1] - 30), (middle[0] - 10, middle[1] - 36))
+    studio.until("document.querySelectorAll('.tracks .key').length === 2")
+    for label, key in (("Size", "ArrowRight"), ("Turn", "PageUp")):
+        page.get_by_label(label, exact=True).focus()
+        studio.press(key)
+    studio.until("studio.player.running && !studio.player.busy")
+    page.locator(".stage").focus()
+    studio.press(" ")
+    page.get_by_label("Onion skin").click()
+    studio.look("12-keys")
+    studio.after(page.locator("#keep-motion").click)
+    made = studio.state["history"][-1]["op"]
+    assert made["op"] == "animate"
+    moving = made["motion"]["layers"].values()
+    (handle,) = [handle for layer in moving for handle in layer.get("handles", ())]
+    first, second = handle["keys"]
+    assert (first["scale"], first["turn"], first["offset"]) == (1, 0, [0, 0])
+    assert second["scale"] > 1
+    assert second["turn"] > 0 > second["offset"][0]
+    assert sum(isinstance(pin, dict) for layer in moving for pin in layer["pins"]) == 1
+    assert studio.state["timeline"]["loop"]
+    page.click("#mode-edit")
+
+
+def go_back_and_forth(studio):
+    page = studio.page
+    page.click("#tab-history")
+    steps = page.locator(".step")
+    end = studio.state["at"]
+    assert steps.count() == end + 1
+    studio.after(steps.nth(2).click)
+    assert studio.state["at"] == 2
+    studio.look("13-history")
+    studio.after(page.locator("#redo").click)
+    studio.after(page.locator("#undo").click)
+    studio.after(steps.nth(end).click)
+    page.click("#tab-code")
+    assert "--rotate red" in page.locator("pre").first.inner_text()
+    assert '.layers["red"].rotated(' in page.locator("pre").nth(1).inner_text()
+    studio.look("14-code")
+
+
+def export(studio):
+    page = studio.page
+    page.click("#export")
+    found = {}
+    for kind in ("PNG", "PSD", "SVG", "HTML", "GIF"):
+        page.locator(".kind", has_text=kind).first.click()
+        if kind == "PNG":
+            page.locator(".export").get_by_label("W", exact=True).fill("100")
+            page.keyboard.press("Enter")
+            studio.look("15-export")
         with page.expect_download() as download:
             page.click("#do-export")
-        with Image.open(download.value.path()) as clip:
-            assert clip.n_frames > 20
+        found[kind] = download.value.path().read_bytes()
+    assert Image.open(io.BytesIO(found["PNG"])).width == 100
+    assert found["PSD"].startswith(b"8BPS")
+    assert b"<svg" in found["SVG"]
+    assert b"<pxi-image" in found["HTML"]
+    with Image.open(io.BytesIO(found["GIF"])) as clip:
+        assert (clip.width, clip.n_frames > 20) == (100, True)
+    page.keyboard.press("Escape")
 
 
-def test_small_window_drawn_by_webgl(layered, tmp_path):
-    with (
-        served(tmp_path / "kept", str(layered)) as address,
-        opened(address, tmp_path, size=(900, 600), query="?draw=gl") as studio,
-    ):
-        studio.shoot("17-small")
+def save(studio):
+    """Bytes of the file that is saved, and the edits that made it."""
+    with studio.page.expect_download() as download:
+        studio.press("Control+s")
+    state = json.loads(studio.ask("fetch('/api/state').then((answer) => answer.text())"))
+    edits = [step["op"] for step in state["history"]]
+    return download.value.path().read_bytes(), edits
+
+
+def test_views_and_fingers_on_a_page_drawn_by_webgl(studio_at, small_pxi):
+    with studio_at(query="?draw=gl") as studio:
+        page = studio.page
+        studio.choose(small_pxi, lambda: page.click("#open-first"))
+        studio.until("studio.store.state.stage === 'editing' && studio.ready()")
+        page.click("#got-it")
+
+        def view():
+            return studio.ask("[studio.view.scale, studio.view.x, studio.view.y]")
+
+        scale, place = view()[0], studio.at(20, 10)
+        page.mouse.move(*place)
+        page.mouse.wheel(0, -240)
+        studio.until(f"studio.view.scale > {1.2 * scale}")
+        assert studio.at(20, 10) == pytest.approx(place, abs=0.01)
+        for key, wanted in (("+", 1.25), ("-", 1.0)):
+            before = view()[0]
+            studio.press(key)
+            assert view()[0] == pytest.approx(before * (1.25 if wanted > 1 else 0.8))
+        studio.press("1")
+        assert view()[0] == 1
+        studio.press("0")
+        assert view()[0] == scale
+        # The space bar pans, whatever the tool.
+        _, x, y = view()
+        page.keyboard.down(" ")
+        stroke(studio, *place, 30, 20)
+        page.keyboard.up(" ")
+        assert view()[1:] == pytest.approx([x + 30, y + 20])
+        # So do arrow keys where nothing is chosen that they could nudge.
+        studio.press("Shift+ArrowLeft")
+        assert view()[1] == pytest.approx(x + 30 + 160)
+        studio.press("0")
+        # Two fingers: the point between them stays there, and what the first one began is dropped.
+        place = studio.at(32, 24)
+        studio.pinch(32, 24, 40, 120)
+        assert view()[0] == pytest.approx(3 * scale, rel=0.01)
+        assert studio.at(32, 24) == pytest.approx(place, abs=1)
+        assert studio.state["at"] == 0
+        # One finger drags.
+        studio.press("0")
+        studio.after(lambda: studio.slide((32, 24), (42, 20)))
+        moved = studio.state["history"][-1]["op"]
+        assert (moved["layer"], moved["by"]) == ("disc", pytest.approx([10, -4], abs=0.5))
+        # One draw call a layer, one more pixel of the pointer costs nothing else.
+        assert studio.ask("studio.times.calls") == 3
+        # The outline clips what WebGL draws, too.
+        studio.press("b")
+        studio.until("document.querySelectorAll('.overlay circle.handle').length > 0")
+        page.wait_for_timeout(200)
+        corner = studio.middle(".overlay circle.handle")
+        (edit, *_) = kept(studio, lambda: stroke(studio, *corner, 40, 5))
+        assert edit["op"] == "point"
+        studio.look("16-webgl")
+
+
+def test_what_is_dropped_and_pasted(studio_at, small_pxi, tmp_path):
+    pytest.importorskip("psd_tools")
+    image = pxi.open(small_pxi)
+    (tmp_path / "a.psd").write_bytes(photoshop.build(image))
+    Image.fromarray(image.render(layers=["disc"])).save(tmp_path / "sun.png")
+    with studio_at() as studio:
+        studio.drop(tmp_path / "a.psd")
+        studio.until("studio.store.state.stage === 'editing' && studio.ready()")
+        assert [v["name"] for v in studio.state["layers"]] == ["back", "bar", "disc"]
         studio.page.click("#got-it")
-        studio.until("studio.ready()")
-        studio.click(*RED)
-        studio.page.wait_for_selector(".overlay .handle")
-        studio.shoot("18-small-chosen")
-        studio.after(lambda: studio.drag(RED, (RED[0] - 20, RED[1])))
-        studio.page.click("#mode-motion")
-        studio.shoot("19-small-motion")
+        studio.after(lambda: studio.paste(tmp_path / "sun.png"))
+        assert studio.state["history"][-1]["op"]["op"] == "insert"
+        # A page that is exported shows the picture by itself.
+        (tmp_path / "a.html").write_text(studio.ask(EXPORTED))
+        page = studio.page.context.new_page()
+        asked = []
+        page.on("request", lambda request: asked.append(request.url.partition(":")[0]))
+        page.goto(f"file://{tmp_path / 'a.html'}")
+        page.wait_for_selector("pxi-image canvas")
+        shown = page.evaluate(
+            "[...document.querySelector('canvas').getContext('2d').getImageData(0, 0, 64, 48).data]"
+        )
+        page.close()
+        data = studio.ask(
+            "fetch('/api/render?format=raw').then((a) => a.arrayBuffer())"
+            ".then((b) => [...new Uint8Array(b)])"
+        )
+    np.testing.assert_allclose(shown, data, atol=2)
+    assert set(asked) <= {"file", "data"}

@@ -96,6 +96,18 @@ def test_a_texture_beyond_the_canvas_is_whole(made, small_pxi):
     assert (pixels[..., 3] > 0).sum() == pytest.approx((before[..., 3] > 0).sum(), rel=0.02)
 
 
+def test_a_texture_goes_on_beyond_the_outline_while_that_is_dragged(made):
+    plain, (x, y, width, height) = texture(made, 2)
+    whole, (left, top, across, down) = texture(made, 2, "?whole=1")
+    assert (left < x < x + width < left + across, top < y < y + height < top + down) == (True, True)
+    assert (whole[..., 3] == 255).all()
+    part = whole[y - top : y - top + height, x - left : x - left + width].astype(int)
+    solid = plain[..., 3] == 255
+    assert np.abs(part - plain)[solid].max() <= 1
+    back, box = texture(made, 0, "?whole=1")
+    assert (box, back.shape) == ([0, 0, 64, 48], (48, 64, 4))
+
+
 def test_what_others_hide_is_filled_in_the_texture(studio, pyramid, tmp_path):
     (tmp_path / "a.pxi").write_bytes(pxi.Image(pyramid.picture).to_bytes())
     made = studio()

@@ -160,6 +160,7 @@ def test_flags_in_words_are_read_as_the_same_edit(flags, small_pxi):
 
 @pytest.mark.parametrize("edit", [*PAGE_EDITS, *({"op": "cut", "layer": "a", **more} for more in (
     {"mask": "m.png"}, {"points": [[1, 2], [3, 4.5]], "outside": [[0, 1]]})),
+    {"op": "complete", "layer": "a"}, {"op": "complete", "layer": "a", "method": "smooth"},
     {"op": "insert", "under": "a", "at": [1, 2], "source": "hat.png"},
     {"op": "insert", "source": "b.pxi", "over": "a", "from_layer": "disc"}])  # fmt: skip
 def test_regular_edits_are_what_flags_give(edit):

@@ -78,6 +78,7 @@ BAD = [
     ({"op": "cut", "layer": "disc", "points": []}, "points"),
     ({"op": "cut", "layer": "disc", "mask": "m.png", "outside": [[1, 2]]}, "either a mask"),
     ({"op": "complete", "layer": "back"}, "implicit texture"),
+    ({"op": "complete", "layer": "back", "method": "magic"}, "exemplar"),
     ({"op": "merge", "layer": "disc", "other": "disc"}, "twice"),
     ({"op": "merge", "layer": "disc", "other": "bar"}, "textures of their own"),
     ({"op": "animate", "motion": {"version": 1}}, "neither 'layers' nor 'preset'"),

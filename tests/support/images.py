@@ -21,5 +21,13 @@ def changed(whole, **fields):
     return replace(whole.data if isinstance(whole, Layer) else whole, **fields)
 
 
+def posed(image, **poses):
+    """An image whose layers have other values in their poses, by name."""
+    layers = [
+        changed(v, pose=changed(v.pose, **poses.get(v.name, {})), name=v.name) for v in image.layers
+    ]
+    return changed(image, layers=Layers(layers))
+
+
 def _data(layers):
     return Layers(v.data if isinstance(v, Layer) else v for v in layers)

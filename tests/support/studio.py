@@ -1,7 +1,13 @@
-"""A studio with its server and a browser, worked by mouse and keyboard as people do."""
+"""A studio with its server and a browser, worked by mouse, fingers and keyboard as people do.
 
+With the variable PXI_SCREENSHOTS, the name of a folder, pictures are taken of what a test does.
+"""
+
+import base64
 import contextlib
+import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -14,7 +20,13 @@ from tests.support.paths import ROOT
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
 
-PATIENCE = 180.0
+SMALL, LARGE = (900, 600), (1280, 800)
+"""Windows: the smallest that the studio works in, and one of a desktop."""
+
+CLOSE = """fetch("/api/close", { method: "POST", body: "{}",
+  headers: { "Content-Type": "application/json" } }).then((answer) => answer.status)"""
+
+PATIENCE = 120.0
 """Seconds to wait for anything; only broken tests wait that long."""
 
 OVERLAPS = """() => {
@@ -71,19 +83,22 @@ class Studio:
 
     Args:
         page: Page of playwright.
-        pictures: Folder of screenshots; that of the variable PXI_SCREENSHOTS, if it is set.
     """
 
-    def __init__(self, page: Any, pictures: Path) -> None:
+    def __init__(self, page: Any) -> None:
         self.page = page
-        self.pictures = Path(os.environ.get("PXI_SCREENSHOTS", pictures))
         self.problems: list[str] = []
+        page.on("request", self._asked)
         page.on("pageerror", lambda error: self.problems.append(str(error)))
         page.on("console", self._heard)
 
     def _heard(self, message: Any) -> None:
         if message.type == "error" and "422" not in message.text:  # what was refused is said
             self.problems.append(message.text)
+
+    def _asked(self, request: Any) -> None:
+        if not re.match(r"http://127\.0\.0\.1:|blob:|data:", request.url):
+            self.problems.append(f"a request that leaves the machine: {request.url}")
 
     def ask(self, expression: str) -> Any:
         """Value of a JavaScript expression."""
@@ -108,6 +123,11 @@ class Studio:
         found: str = self.ask("document.querySelector('.message:not([hidden])')?.innerText ?? ''")
         return found
 
+    def hears(self, text: str) -> None:
+        """Waits for a message that has a text."""
+        self.until(f"(document.querySelector('.message:not([hidden])')?.innerText ?? '')"
+                   f".includes({json.dumps(text)})")  # fmt: skip
+
     def after(self, action: Callable[[], Any]) -> dict[str, Any]:
         """State after an action that changes it."""
         version = self.state["version"]
@@ -115,16 +135,65 @@ class Studio:
         self.until(f"studio.store.state.version > {version}")
         return self.state
 
-    def drop(self, path: Path) -> None:
-        """Drops a file onto the middle of the window, as from another program."""
-        session = self.page.context.new_cdp_session(self.page)
+    def drop(self, path: Path, where: tuple[float, float] | None = None) -> None:
+        """Drops a file onto a place of the window, by default its middle, as another program."""
         size = self.page.viewport_size
+        x, y = where or (size["width"] / 2, size["height"] / 2)
         data = {"items": [], "files": [str(path)], "dragOperationsMask": 1}
-        for kind in ("dragEnter", "dragOver", "dragOver", "dragOver", "drop"):
-            place = {"x": size["width"] / 2, "y": size["height"] / 2}
-            session.send("Input.dispatchDragEvent", {"type": kind, **place, "data": data})
-            self.page.wait_for_timeout(60)
-        session.detach()
+        with self._devtools() as send:
+            for kind in ("dragEnter", "dragOver", "dragOver", "dragOver", "drop"):
+                send("Input.dispatchDragEvent", {"type": kind, "x": x, "y": y, "data": data})
+                self.page.wait_for_timeout(60)
+
+    def choose(self, path: Path, action: Callable[[], Any]) -> None:
+        """Does what asks for a file, and chooses one."""
+        with self.page.expect_file_chooser() as asked:
+            action()
+        asked.value.set_files(path)
+
+    def paste(self, path: Path) -> None:
+        """Pastes a PNG file that another program has copied."""
+        self.page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+        coded = base64.b64encode(path.read_bytes()).decode()
+        self.page.evaluate(
+            "(coded) => { const bytes = Uint8Array.from(atob(coded), (c) => c.charCodeAt(0));"
+            "return navigator.clipboard.write([new ClipboardItem({"
+            "'image/png': new Blob([bytes], { type: 'image/png' })})]); }",
+            coded,
+        )
+        self.press("Control+v")
+
+    def pinch(self, x: float, y: float, start: float, end: float) -> None:
+        """Puts two fingers beside a point of the canvas, `start` pixels apart, and spreads them."""
+        cx, cy = self.at(x, y)
+        with self._devtools() as send:
+            send("Emulation.setTouchEmulationEnabled", {"enabled": True, "maxTouchPoints": 2})
+            for k in range(6):
+                half = (start + (end - start) * max(k - 1, 0) / 4) / 2
+                both = [{"x": cx + way * half, "y": cy, "id": way + 1} for way in (-1, 1)]
+                kind = "touchMove" if k > 1 else "touchStart"
+                send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": both[: k + 1]})
+            send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+
+    def slide(self, start: tuple[float, float], end: tuple[float, float]) -> None:
+        """Drags with one finger from a point of the canvas to another one."""
+        (x0, y0), (x1, y1) = self.at(*start), self.at(*end)
+        with self._devtools() as send:
+            send("Emulation.setTouchEmulationEnabled", {"enabled": True, "maxTouchPoints": 2})
+            for k in range(6):
+                t = k / 5
+                finger = {"x": x0 + t * (x1 - x0), "y": y0 + t * (y1 - y0), "id": 0}
+                kind = "touchMove" if k else "touchStart"
+                send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [finger]})
+            send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+
+    @contextlib.contextmanager
+    def _devtools(self) -> Iterator[Callable[[str, dict[str, Any]], Any]]:
+        session = self.page.context.new_cdp_session(self.page)
+        try:
+            yield session.send
+        finally:
+            session.detach()
 
     def at(self, x: float, y: float) -> tuple[float, float]:
         """Place in the window of a point of the canvas."""
@@ -133,6 +202,14 @@ class Studio:
             " document.querySelector('.stage').getBoundingClientRect())"
         )
         return left, top
+
+    def middle(self, selector: str) -> tuple[float, float]:
+        """Place in the window of the first element of a selector, which may be drawn anew."""
+        x, y = self.ask(
+            f"((r) => [r.x + r.width / 2, r.y + r.height / 2])(document.querySelector('{selector}')"
+            ".getBoundingClientRect())"
+        )
+        return x, y
 
     def click(self, x: float, y: float) -> None:
         """Clicks a point of the canvas."""
@@ -158,31 +235,49 @@ class Studio:
         """Row of a layer in the list."""
         return self.page.locator(f'.layers .layer[data-name="{name}"]')
 
-    def shoot(self, name: str) -> None:
-        """Takes a screenshot in both themes, and checks that nothing overlaps."""
-        for theme in ("light", "dark"):
-            self.ask(f"document.documentElement.dataset.theme = '{theme}'")
-            self.pictures.mkdir(parents=True, exist_ok=True)
-            self.page.screenshot(path=self.pictures / f"{name}-{theme}.png")
+    def look(self, name: str) -> None:
+        """Checks that nothing overlaps; takes pictures in both themes if they are asked for."""
         assert self.page.evaluate(OVERLAPS) == [], name
+        if not os.environ.get("PXI_SCREENSHOTS"):
+            return
+        size, theme = self.page.viewport_size, self.ask("document.documentElement.dataset.theme")
+        for width, height in (LARGE, (size["width"], size["height"])):
+            self.page.set_viewport_size({"width": width, "height": height})
+            self.page.wait_for_timeout(400)
+            for shown in ("light", "dark"):
+                self.ask(f"document.documentElement.dataset.theme = '{shown}'")
+                file = Path(os.environ["PXI_SCREENSHOTS"]) / f"{name}-{width}-{shown}.png"
+                self.page.screenshot(path=file)
+        self.ask(f"document.documentElement.dataset.theme = '{theme}'")
 
 
 @contextlib.contextmanager
-def opened(
-    address: str, pictures: Path, size: tuple[int, int] = (1280, 800), query: str = ""
-) -> Iterator[Studio]:
-    """A studio in headless Chromium; it must have had no problem in the end."""
+def chromium() -> Iterator[Any]:
+    """Headless Chromium, as an object of playwright."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        page = browser.new_page(viewport={"width": size[0], "height": size[1]})
-        page.set_default_timeout(1000 * PATIENCE)
-        studio = Studio(page, pictures)
-        page.goto(address)
-        if query:
-            page.goto(page.url + query)
-        studio.until("window.studio?.store.state.version >= 0")
+        yield browser
+        browser.close()
+
+
+@contextlib.contextmanager
+def opened(
+    browser: Any, address: str, size: tuple[int, int] = SMALL, query: str = ""
+) -> Iterator[Studio]:
+    """Page of a studio, of which nothing is open; it must have had no problem in the end."""
+    context = browser.new_context(viewport={"width": size[0], "height": size[1]})
+    page = context.new_page()
+    page.set_default_timeout(1000 * PATIENCE)
+    studio = Studio(page)
+    page.goto(address)
+    if query:
+        page.goto(page.url + query)
+    studio.until("window.studio?.store.state.version >= 0")
+    try:
         yield studio
         assert studio.problems == []
-        browser.close()
+    finally:
+        studio.ask(CLOSE)
+        context.close()

@@ -1,6 +1,6 @@
 /** What people do, as requests; what the server refuses is said in place. */
 import { post, Refused, upload } from "./server.js";
-import { preview, meshOf } from "./scene.js";
+import { preview, meshOf, textureOf } from "./scene.js";
 import { arrived, emit, layerOf, on, select, store } from "./store.js";
 import { h, size } from "./dom.js";
 
@@ -43,7 +43,7 @@ export const edit = (edits) => act(() => post("/api/edit", { edits }));
 export async function commit(edits, names) {
   const shown = [...names].map((n) => /** @type {[string, any]} */ ([n, preview.get(n)]));
   const state = await edit(edits);
-  await Promise.all(shown.map(([n, p]) => (state && p?.bent && layerOf(n) ? meshOf(n).catch(() => {}) : null)));
+  await Promise.all(shown.flatMap(([n, p]) => (state && layerOf(n) ? [p?.bent && meshOf(n), p?.clip && textureOf(n)] : [])).map((v) => v?.catch(() => {})));
   for (const [name, mine] of shown) if (preview.get(name) === mine) preview.delete(name);
   emit("drawn");
   return state;
@@ -133,8 +133,8 @@ function offer(what, back) {
   };
   say(`${what} removed. Fill with:`, {
     actions: [
-      ["What is stored", () => renew([])],
-      ...(layerOf(back)?.can_complete ? [/** @type {[string, () => void]} */ (["Surroundings", () => renew([{ op: "complete", layer: back }])])] : []),
+      ["As stored", () => renew([])],
+      ...(layerOf(back)?.can_complete ? /** @type {[string, () => void][]} */ ([["Smooth", () => renew([{ op: "complete", layer: back, method: "smooth" }])], ["Surroundings", () => renew([{ op: "complete", layer: back }])]]) : []),
       ["Picture\u2026", () => choose("image/*", async (file) => { const source = await lend(file); if (source) renew([{ op: "texture", layer: back, source }]); })],
       ["Undo", () => { quiet(); act(() => post("/api/undo", { steps: store.state.at - at + 1 })); }],
     ],

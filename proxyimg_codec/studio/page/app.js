@@ -10,7 +10,7 @@ import { ACCEPT } from "./panels/opening.js";
 import { encoding } from "./panels/pointing.js";
 import { root as properties } from "./panels/properties.js";
 import { root as timeline } from "./panels/timeline.js";
-import { ready } from "./scene.js";
+import { preview, ready } from "./scene.js";
 import { listen } from "./server.js";
 import * as stage from "./stage.js";
 import { arrived, emit, on, select, store, targets, use } from "./store.js";
@@ -86,6 +86,8 @@ function tab(chosen) {
     one.tabIndex = id === chosen ? 0 : -1;
     panels.children[tabs.findIndex(([t]) => t === id)].hidden = id !== chosen;
   }
+  panels.scrollTop = 0;
+  if (chosen === "history") steps.querySelector(".now")?.scrollIntoView({ block: "nearest" });
 }
 tab("properties");
 
@@ -99,7 +101,8 @@ async function group() {
   if (state) { select([name]); layers.renaming(name); }
 }
 
-// Messages, in place.
+// Messages, in place. Those of the package begin as parts of a line do.
+const sentence = (/** @type {string} */ text) => text.replace(/^[a-z]+ /, (word) => word[0].toUpperCase() + word.slice(1));
 const message = h("div", { class: "message float", hidden: true, "aria-live": "polite" });
 let fade = 0;
 on("message", (m) => {
@@ -108,7 +111,7 @@ on("message", (m) => {
   if (!m) return;
   message.className = `message float ${m.kind ?? ""}`;
   message.setAttribute("role", m.kind === "error" ? "alert" : "status");
-  message.replaceChildren(icon(m.kind === "error" ? "triangle-alert" : m.kind === "done" ? "check" : "info", 15), h("span", {}, m.text),
+  message.replaceChildren(icon(m.kind === "error" ? "triangle-alert" : m.kind === "done" ? "check" : "info", 15), h("span", {}, sentence(m.text)),
     ...(m.actions ?? []).map((/** @type {[string, () => void]} */ [text, run]) => button({ text, onclick: run })),
     button({ icon: "x", label: "Close", size: 14, class: "quiet", onclick: () => actions.quiet() }));
   if (!m.actions) fade = window.setTimeout(actions.quiet, m.kind === "error" ? 12000 : 5000);
@@ -211,6 +214,8 @@ addEventListener("keydown", (e) => {
   }
   const inSide = side.contains(/** @type {Node} */ (e.target)) || timeline.contains(/** @type {Node} */ (e.target));
   if (!inSide && stage.tools[store.tool]?.key?.(e)) return e.preventDefault();
+  const way = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[e.key];
+  if (way && stage.root.contains(/** @type {Node} */ (e.target))) { e.preventDefault(); return stage.pan(way[0] * (e.shiftKey ? 160 : 40), way[1] * (e.shiftKey ? 160 : 40)); }
   if (e.key === " " && !/** @type {Element} */ (e.target).closest("button, input, [role=option]")) {
     e.preventDefault();
     if (store.mode === "motion" && editing) { if (!e.repeat) motion.toggle(); } else stage.grab(true);
@@ -245,4 +250,4 @@ on("state", (old) => {
 });
 
 /** For measuring: see tests/studio. */
-Object.assign(window, { studio: { times: stage.times, view: stage.view, store, player: motion.player, ready } });
+Object.assign(window, { studio: { times: stage.times, view: stage.view, store, player: motion.player, ready, preview: (/** @type {string} */ name) => preview.get(name) } });

@@ -6,7 +6,7 @@ import * as scene from "./scene.js";
 import { draw, playsWhen, unrest } from "./stage.js";
 import { emit, layerOf, moved, on, store, targets } from "./store.js";
 
-/** @typedef {{layer: string, at: number[], radius: number, keys: {time: number, offset: number[], scale: number}[]}} Handle */
+/** @typedef {{layer: string, at: number[], radius: number, keys: {time: number, offset: number[], scale: number, turn: number}[]}} Handle */
 
 /** What the panel and the timeline set. */
 export const draft = {
@@ -141,10 +141,10 @@ export async function still() {
   await edit(store.state.layers.filter((/** @type {any} */ l) => l.moves).map((/** @type {any} */ l) => ({ op: "still", layer: l.name })));
 }
 
-/** A handle at a point of a layer. @param {string} layer @param {number[]} at @returns {Handle} */
+/** A handle at a point of a layer at rest. @param {string} layer @param {number[]} at @returns {Handle} */
 export function handle(layer, at) {
   const { bounds: b } = /** @type {any} */ (layerOf(layer));
-  const made = { layer, at, radius: Math.round(Math.max(6, 0.12 * Math.hypot(b[2] - b[0], b[3] - b[1]))), keys: [{ time: 0, offset: [0, 0], scale: 1 }] };
+  const made = { layer, at, radius: Math.round(Math.max(6, (0.12 * Math.hypot(b[2] - b[0], b[3] - b[1])) / scene.enlarged(layer))), keys: [{ time: 0, offset: [0, 0], scale: 1, turn: 0 }] };
   layers ??= movers();
   if (!layers.includes(layer)) layers.push(layer);
   draft.handles.push(made);
@@ -152,7 +152,7 @@ export function handle(layer, at) {
   return made;
 }
 
-/** Sets a key of a handle at the present moment. @param {Handle} h @param {{offset?: number[], scale?: number}} values */
+/** Sets a key of a handle at the present moment. @param {Handle} h @param {{offset?: number[], scale?: number, turn?: number}} values */
 export function setKey(h, values) {
   const time = Math.min(draft.duration, Math.round(player.time * draft.fps) / draft.fps);
   const near = h.keys.find((k) => Math.abs(k.time - time) < 0.5 / draft.fps);
@@ -163,12 +163,13 @@ export function setKey(h, values) {
   emit("motion");
 }
 
-/** Offset and scale of a handle at a time. @param {Handle} h @param {number} time */
+/** Offset, scale and angle of a handle at a time. @param {Handle} h @param {number} time */
 export function at(h, time) {
   const after = h.keys.findIndex((k) => k.time > time), last = h.keys[h.keys.length - 1];
-  if (after < 0) return { offset: [...last.offset], scale: last.scale };
+  if (after < 0) return { offset: [...last.offset], scale: last.scale, turn: last.turn };
   const b = h.keys[after], a = h.keys[after - 1] ?? b, span = b.time - a.time, u = span ? (time - a.time) / span : 0, s = u * u * (3 - 2 * u);
-  return { offset: [0, 1].map((i) => a.offset[i] + s * (b.offset[i] - a.offset[i])), scale: a.scale + s * (b.scale - a.scale) };
+  const between = (/** @type {number} */ p, /** @type {number} */ q) => p + s * (q - p);
+  return { offset: [0, 1].map((i) => between(a.offset[i], b.offset[i])), scale: between(a.scale, b.scale), turn: between(a.turn, b.turn) };
 }
 
 // Playing.

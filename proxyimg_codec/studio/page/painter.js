@@ -1,12 +1,14 @@
+import { pathData, sampled } from "./bezier.js";
+
 /**
  * Draws layers with WebGL2: a texture each, one draw call each, blended premultiplied from the back.
  *
  * What is drawn is a list of items {key, matrix, box, colour, opacity, mesh}: `key` names a texture that
  * was given, `box` is what it covers at rest. A `mesh` {key, positions, uvs, triangles} takes the place
- * of the box when the layer is bent.
+ * of the box when the layer is bent; a `clip` is an outline on the canvas that cuts it.
  */
 
-/** @typedef {{key: string, matrix: number[], box: number[], colour: number[]|null, opacity: number,
+/** @typedef {{key: string, matrix: number[], box: number[], colour: number[]|null, opacity: number, clip?: number[][][]|null,
  *   mesh?: {key: string, positions: Float32Array, uvs: Float32Array, triangles: Uint32Array}|null}} Item */
 
 const VERTEX = `#version 300 es
@@ -40,7 +42,7 @@ void main() {
 export class Painter {
   /** @param {HTMLCanvasElement} canvas */
   constructor(canvas) {
-    const gl = canvas.getContext("webgl2", { alpha: true, antialias: false, premultipliedAlpha: true });
+    const gl = canvas.getContext("webgl2", { alpha: true, antialias: false, stencil: true, premultipliedAlpha: true });
     if (!gl) throw new Error("no WebGL2");
     this.gl = gl;
     this.canvas = canvas;
@@ -142,9 +144,37 @@ export class Painter {
         const m = item.colour;
         gl.uniformMatrix4fv(uniforms.colour, false, [m[0], m[4], m[8], 0, m[1], m[5], m[9], 0, m[2], m[6], m[10], 0, m[3], m[7], m[11], 1]);
       }
+      if (item.clip) this.#clip(item.clip, [sx, tx, sy, ty]);
       this.#shape(item.mesh);
+      gl.disable(gl.STENCIL_TEST);
       this.calls++;
     }
+  }
+
+  /** Lets what is drawn next show in an outline alone. @param {number[][][]} paths @param {number[]} view scale and shift of x, then of y */
+  #clip(paths, [sx, tx, sy, ty]) {
+    const { gl, buffers } = this;
+    gl.clear(gl.STENCIL_BUFFER_BIT);
+    gl.enable(gl.STENCIL_TEST);
+    gl.colorMask(false, false, false, false);
+    gl.stencilFunc(gl.ALWAYS, 0, 1);
+    gl.stencilOp(gl.INVERT, gl.INVERT, gl.INVERT);
+    const using = gl.getParameter(gl.CURRENT_PROGRAM), { program, uniforms } = this.programs[0];
+    gl.useProgram(program);
+    gl.uniform3f(uniforms.row0, sx, 0, tx);
+    gl.uniform3f(uniforms.row1, 0, sy, ty);
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffers.at);
+    gl.vertexAttribPointer(0, 2, gl.FLOAT, false, 0, 0);
+    gl.vertexAttribPointer(1, 2, gl.FLOAT, false, 0, 0);
+    for (const path of paths) {
+      const points = new Float32Array(sampled(path));
+      gl.bufferData(gl.ARRAY_BUFFER, points, gl.STREAM_DRAW);
+      gl.drawArrays(gl.TRIANGLE_FAN, 0, points.length / 2);
+    }
+    gl.useProgram(using);
+    gl.colorMask(true, true, true, true);
+    gl.stencilFunc(gl.EQUAL, 1, 1);
+    gl.stencilOp(gl.KEEP, gl.KEEP, gl.KEEP);
   }
 
   #shape(mesh) {
@@ -223,9 +253,15 @@ export class FlatPainter {
       const sheet = this.#sheet(item);
       if (!sheet) continue;
       c.globalAlpha = item.opacity;
+      if (item.clip) {
+        c.save();
+        c.setTransform(base);
+        c.clip(new Path2D(pathData(item.clip)), "evenodd");
+      }
       c.setTransform(base.multiply(new DOMMatrix(item.matrix)));
       if (item.mesh) this.#bent(sheet, item.mesh);
       else c.drawImage(sheet, item.box[0], item.box[1], item.box[2], item.box[3]);
+      if (item.clip) c.restore();
       this.calls++;
     }
     c.restore();

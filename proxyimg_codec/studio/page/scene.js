@@ -1,13 +1,15 @@
 /** The layers as they are drawn now: what the server sent, and what is being dragged on top of it. */
 import { get, pixels } from "./server.js";
+import { attach } from "./arap.js";
+import { pathData, sampled } from "./bezier.js";
 import { apply, inverse, product } from "./matrix.js";
 import { emit, layerOf, on, store } from "./store.js";
 
 /** @typedef {{nodes: Float32Array, bent: Float32Array, faces: number[], uvs: Float32Array, box: string, rest: Float32Array,
  *   skirt: number[][], triangles: Uint32Array, key: string}} Mesh */
 
-/** Changes that are not yet with the server, by name of layer.
- * @type {Map<string, {matrix?: number[], bent?: Float32Array, opacity?: number, colour?: number[], hidden?: boolean}>} */
+/** Changes that are not yet with the server, by name of layer; `clip` is another outline on the canvas.
+ * @type {Map<string, {matrix?: number[], bent?: Float32Array, opacity?: number, colour?: number[], hidden?: boolean, clip?: number[][][]}>} */
 export const preview = new Map();
 
 /** Displacements of nodes at the moment that is played, by name of layer. @type {Map<string, Float32Array>} */
@@ -43,17 +45,32 @@ function once(key, work) {
   return made;
 }
 
-/** Fetches the texture of a layer. @param {import("./store.js").Layer} layer @param {number} scale */
-async function texture(layer, scale) {
-  await once(`${layer.texture} ${scale}`, async () => {
-    const got = await pixels(`/api/layers/${layer.index}/texture?scale=${scale}&key=${encodeURIComponent(layer.texture)}`);
+/** Fetches the texture of a layer. @param {import("./store.js").Layer} layer @param {number} scale @param {boolean} [whole] also beyond its outline */
+async function texture(layer, scale, whole = false) {
+  const key = whole ? wholeKey(layer) : layer.texture;
+  await once(`${key} ${scale}`, async () => {
+    const got = await pixels(`/api/layers/${layer.index}/texture?scale=${scale}${whole ? "&whole=1" : ""}&key=${encodeURIComponent(layer.texture)}`);
     if (layerOf(layer.name)?.texture !== layer.texture) return;
-    textures.set(layer.texture, { box: got.box, scale });
-    painter?.give(layer.texture, got);
-    latest.set(layer.name, layer.texture);
+    textures.set(key, { box: got.box, scale });
+    painter?.give(key, got);
+    if (!whole) latest.set(layer.name, key);
     tidy();
     emit("drawn");
   });
+}
+
+const wholeKey = (/** @type {any} */ layer) => `whole ${layer.texture}`;
+
+/** Fetches what lies beyond the outline of a layer, too, so that the outline can be dragged. @param {string} name */
+export async function wholeOf(name) {
+  const layer = layerOf(name);
+  if (layer && !textures.has(wholeKey(layer))) await texture(layer, textures.get(layer.texture)?.scale ?? 1, true);
+}
+
+/** Fetches the texture that a layer has now, if it is not there. @param {string} name */
+export async function textureOf(name) {
+  const layer = layerOf(name);
+  if (layer && !textures.has(layer.texture)) await texture(layer, 1);
 }
 
 /** Fetches the mesh of a layer. @param {string} name @returns {Promise<Mesh>} */
@@ -93,7 +110,7 @@ function spread({ skirt }, nodes, into) {
 function tidy() {
   const { layers } = store.state, names = new Set(layers.map((/** @type {any} */ l) => l.name));
   for (const name of latest.keys()) if (!names.has(name)) latest.delete(name);
-  const kept = new Set([...latest.values(), ...layers.map((/** @type {any} */ l) => l.texture)]);
+  const kept = new Set([...latest.values(), ...layers.flatMap((/** @type {any} */ l) => [l.texture, wholeKey(l)])]);
   for (const key of [...textures.keys()]) if (!kept.has(key)) { textures.delete(key); painter?.drop(key); }
 }
 
@@ -131,15 +148,50 @@ export function present(name, mesh, bent = preview.get(name)?.bent ?? mesh.bent)
   return out;
 }
 
+/** Point of a layer at rest that is at a point of the canvas. @param {string} name @param {number} x @param {number} y @returns {number[]} */
+export function atRest(name, x, y) {
+  const mesh = meshes.get(name), [u, v] = apply(inverse(matrixOf(name)), x, y);
+  return mesh && layerOf(name)?.bent ? carried(mesh, mesh.bent, mesh.nodes, u, v) : [u, v];
+}
+
+/** Point of the canvas at which a point of a layer at rest is. @param {string} name @param {number} u @param {number} v @returns {[number, number]} */
+export function onCanvas(name, u, v) {
+  const mesh = meshes.get(name), [x, y] = mesh && layerOf(name)?.bent ? carried(mesh, mesh.nodes, mesh.bent, u, v) : [u, v];
+  return apply(matrixOf(name), x, y);
+}
+
+/** Where a point goes with the nodes of a mesh. @param {Mesh} mesh @param {Float32Array} from @param {Float32Array} to @param {number} x @param {number} y */
+function carried(mesh, from, to, x, y) {
+  const { triangle, weights } = attach(from, mesh.faces, x, y);
+  return [0, 1].map((axis) => weights.reduce((/** @type {number} */ t, /** @type {number} */ w, /** @type {number} */ k) => t + w * to[2 * mesh.faces[3 * triangle + k] + axis], 0));
+}
+
+/** Vector on the canvas of one before the matrix of a layer. @param {string} name @param {number[]} vector @param {boolean} [back] the other way */
+export function turned(name, [x, y], back = false) {
+  const m = back ? inverse(matrixOf(name)) : matrixOf(name);
+  return [m[0] * x + m[2] * y, m[1] * x + m[3] * y];
+}
+
+/** How much the matrix of a layer enlarges it. @param {string} name */
+export function enlarged(name) { const [a, b, c, d] = matrixOf(name); return Math.sqrt(Math.abs(a * d - b * c)) || 1; }
+
+/** Shows a layer bent: its nodes at places on the canvas, flat. @param {string} name @param {ArrayLike<number>} places */
+export function bend(name, places) {
+  const back = inverse(matrixOf(name)), bent = new Float32Array(places.length);
+  for (let i = 0; i < places.length; i += 2) [bent[i], bent[i + 1]] = apply(back, places[i], places[i + 1]);
+  preview.set(name, { ...preview.get(name), bent });
+}
+
 /** What to draw, back to front. @param {{sway: Map<string, Float32Array>, share: number}[]} ghosts faint copies @returns {import("./painter.js").Item[]} */
 export function items(ghosts = []) {
   const out = [];
   for (const layer of store.state.layers) {
     const change = preview.get(layer.name);
     if (change?.hidden ?? layer.hidden) continue;
-    const key = textures.has(layer.texture) ? layer.texture : latest.get(layer.name) ?? layer.texture;
+    const clip = change?.clip && textures.has(wholeKey(layer)) ? change.clip : null;
+    const key = clip ? wholeKey(layer) : textures.has(layer.texture) ? layer.texture : latest.get(layer.name) ?? layer.texture;
     const item = {
-      key, matrix: change?.matrix ?? layer.matrix, box: textures.get(key)?.box ?? layer.box,
+      key, clip, matrix: change?.matrix ?? layer.matrix, box: textures.get(key)?.box ?? layer.box,
       colour: change?.colour ?? layer.colour, opacity: change?.opacity ?? layer.opacity, mesh: /** @type {any} */ (null),
     };
     const mesh = meshes.get(layer.name), moves = sway.get(layer.name), bent = change?.bent;
@@ -209,16 +261,6 @@ export function outline(name) {
 
 const outlineKey = (/** @type {any} */ l) => `${l.name}|${l.texture}|${l.mesh}|${l.matrix}|${l.paths}|${store.state.at}`;
 
-/** Path data of control points. @param {number[][][]} paths @param {(x: number, y: number) => number[]} [place] */
-export function pathData(paths, place = (x, y) => [x, y]) {
-  return paths.map((p) => {
-    const q = p.map(([x, y]) => place(x, y).map((v) => v.toFixed(2)).join(" "));
-    let d = `M${q[0]}`;
-    for (let k = 0; k < q.length; k += 3) d += `C${q[k + 1]} ${q[k + 2]} ${q[(k + 3) % q.length]}`;
-    return `${d}Z`;
-  }).join("");
-}
-
 /** Oriented box of a layer before its matrix: x0, y0, x1, y1. @param {string} name */
 export function localBox(name) {
   const layer = layerOf(name), paths = outline(name);
@@ -226,14 +268,10 @@ export function localBox(name) {
   if (!paths) return layer.index === 0 && store.state.opaque ? [0, 0, ...store.state.size] : layer.box.length && [layer.box[0], layer.box[1], layer.box[0] + layer.box[2], layer.box[1] + layer.box[3]];
   const back = inverse(layer.matrix);
   let [x0, y0, x1, y1] = [Infinity, Infinity, -Infinity, -Infinity];
-  for (const p of paths) {
-    for (let k = 0; k < p.length; k += 3) {
-      const c = [0, 1, 2, 3].map((i) => p[(k + i) % p.length]);
-      for (let i = 0; i < 8; i++) {
-        const t = i / 8, w = [(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t * t * (1 - t), t ** 3];
-        const [x, y] = apply(back, w.reduce((s, v, n) => s + v * c[n][0], 0), w.reduce((s, v, n) => s + v * c[n][1], 0));
-        x0 = Math.min(x0, x); x1 = Math.max(x1, x); y0 = Math.min(y0, y); y1 = Math.max(y1, y);
-      }
+  for (const p of paths.map(sampled)) {
+    for (let i = 0; i < p.length; i += 2) {
+      const [x, y] = apply(back, p[i], p[i + 1]);
+      x0 = Math.min(x0, x); x1 = Math.max(x1, x); y0 = Math.min(y0, y); y1 = Math.max(y1, y);
     }
   }
   return [x0, y0, x1, y1];

@@ -24,7 +24,7 @@ const sheet = h("canvas", { class: "sheet" });
 const exact = h("canvas", { class: "sheet exact", hidden: true });
 const paper = h("div", { class: "paper" });
 const overlay = s("svg", { class: "overlay", "aria-hidden": "true" });
-export const root = h("div", { class: "stage", tabIndex: 0, role: "application", "aria-label": "Canvas. Arrow keys nudge what is selected; plus and minus zoom." }, paper, sheet, exact, overlay);
+export const root = h("div", { class: "stage", tabIndex: 0, role: "application", "aria-label": "Canvas. Arrow keys nudge what is selected, or move the view; plus and minus zoom." }, paper, sheet, exact, overlay);
 
 const ratio = () => Math.min(window.devicePixelRatio || 1, 3);
 /** How to draw, if the address says so: `?draw=gl` or `?draw=flat`. */
@@ -181,6 +181,8 @@ export function moved() {
 
 /** @param {number} factor @param {number} [x] @param {number} [y] */
 export function zoom(factor, x, y) { view.zoom(factor, x, y); moved(); }
+/** @param {number} dx @param {number} dy in CSS pixels */
+export function pan(dx, dy) { view.pan(dx, dy); moved(); }
 export function fit() { if (store.state.size) { view.fit(store.state.size); moved(); } }
 /** @param {number} scale */
 export function zoomTo(scale) { zoom(scale / view.scale); }
@@ -222,8 +224,8 @@ root.addEventListener("pointermove", (e) => {
     const others = [...pressed].filter(([id]) => id !== e.pointerId).map(([, v]) => v);
     if (others.length === 1) {
       const [o] = others, before = Math.hypot(at.x - o.x, at.y - o.y), now = Math.hypot(p.sx - o.x, p.sy - o.y);
-      if (before > 10) view.zoom(now / before, (p.sx + o.x) / 2, (p.sy + o.y) / 2);
       view.pan((p.sx - at.x) / 2, (p.sy - at.y) / 2);
+      if (before > 10) view.zoom(now / before, (p.sx + o.x) / 2, (p.sy + o.y) / 2);
     } else view.pan(p.sx - at.x, p.sy - at.y);
     root.style.cursor = "grabbing";
     moved();

@@ -1,15 +1,15 @@
 /** Export, in place: what kind, how large, and the finished file. */
 import { act, cancel } from "../actions.js";
-import { button, h, size, slider } from "../dom.js";
+import { button, h, number, size, slider } from "../dom.js";
 import { post } from "../server.js";
 import { on, store } from "../store.js";
-import { select } from "./properties.js";
 
 /** @type {[string, string, string, "picture"|"layers"|"clip"][]} */
 const KINDS = [
   ["png", "PNG", "A picture at any size, without loss.", "picture"], ["jpg", "JPEG", "A picture at any size, small.", "picture"],
   ["webp", "WebP", "A picture at any size, small, with transparency.", "picture"], ["tif", "TIFF", "A picture for print.", "picture"],
   ["pxi", "PXI", "Layers, editable, with the history.", "layers"], ["ora", "ORA", "Layers for Krita, GIMP and MyPaint.", "layers"],
+  ["psd", "PSD", "Layers for Photoshop, Affinity and Photopea.", "layers"],
   ["svg", "SVG", "Outlines of the layers.", "layers"], ["html", "HTML", "A page of its own that shows the picture without a network.", "layers"],
   ["mp4", "MP4", "A clip.", "clip"], ["webm", "WebM", "A clip with transparency.", "clip"], ["gif", "GIF", "A clip that plays everywhere.", "clip"],
   ["webp-clip", "WebP", "A clip, small, with transparency.", "clip"], ["apng", "APNG", "A clip without loss.", "clip"],
@@ -39,11 +39,14 @@ function build() {
       onclick: () => { chosen.kind = k; build(); },
     })))]);
   const sized = sort === "picture" || sort === "clip";
-  const widths = [[0, `${w} \u00d7 ${hh}`], ...[0.5, 2, 4].map((f) => [Math.round(w * f), `${Math.round(w * f)} \u00d7 ${Math.round(hh * f)}`])];
+  const width = chosen.width || w, sides = /** @type {[string, number, string][]} */ ([["W", w, "Width in pixels"], ["H", hh, "Height in pixels"]]);
+  const sizing = h("div", {},
+    h("div", { class: "grid" }, ...sides.map(([label, side, title]) => number({ label, title, unit: "px", digits: 0, value: Math.round((width * side) / w), onchange: (v) => wide((v * w) / side) }))),
+    h("div", { class: "bar" }, ...[0.5, 1, 2, 4].map((f) => button({ text: f < 1 ? "\u00bd\u00d7" : `${f}\u00d7`, label: `${f} times the size of the canvas`, pressed: width === Math.round(w * f), onclick: () => wide(w * f) }))));
   root.replaceChildren(
     h("h2", {}, "Export"), ...kinds, h("p", { class: "note" }, meaning),
     ...[
-      sized && select("Size", widths.map(([v, text]) => [String(v), String(text)]), String(chosen.width), (v) => { chosen.width = Number(v); }),
+      sized && sizing,
       ["jpg", "webp", "mp4", "webm", "webp-clip"].includes(kind) && slider({ label: "Quality", min: 1, max: 100, value: chosen.quality, oninput: (v) => { chosen.quality = v; } }),
       sort === "clip" && slider({ label: "Frames", min: 6, max: 60, unit: "/s", value: chosen.fps, oninput: (v) => { chosen.fps = v; } }),
       kind === "pxi" && check("Forget the history", "baked"), kind === "pxi" && check("Purge what was removed, for good", "purged"),
@@ -51,6 +54,12 @@ function build() {
     (progress = h("progress", { max: 1, hidden: !job, "aria-label": "Exporting" })),
     h("div", { class: "bar foot" }, h("span", { class: "result", role: "status" }),
       job ? button({ text: "Cancel", onclick: cancel }) : button({ text: `Export ${title}`, icon: "download", class: "primary", id: "do-export", onclick: start })));
+}
+
+/** Sets the width of what is exported. @param {number} v */
+function wide(v) {
+  chosen.width = Math.max(1, Math.min(16384, Math.round(v)));
+  build();
 }
 
 /** @param {string} text @param {"baked"|"purged"} key */
@@ -75,4 +84,7 @@ on("job-end", (j) => {
   const done = root.querySelector(".result");
   done?.append(h("a", { href: j.result.url, download: j.result.name }, `${j.result.name}`), ` ${size(j.result.bytes)}`);
 });
-on("state", () => { if (store.state.stage !== "editing") root.hidden = true; });
+on("state", (before) => {
+  if (store.state.stage !== "editing") root.hidden = true;
+  if (String(before.size) !== String(store.state.size)) chosen.width = 0;
+});

@@ -13,8 +13,14 @@ let presets = [];
 
 const SIDES = ["top", "bottom", "left", "right", "centre"];
 
+/** Sides that stay: those chosen, or those of the preset and where the canvas cuts layers off. @returns {string[]} */
+function staying() {
+  const mine = Object.values(motion?.layers ?? {}).flatMap((/** @type {any} */ l) => l.pins ?? []).filter((p) => typeof p === "string");
+  return draft.sides ?? (mine.length ? [...new Set(mine)] : presets.find((p) => p.name === draft.preset)?.pins ?? []);
+}
+
 function sides() {
-  const now = draft.sides ?? presets.find((p) => p.name === draft.preset)?.pins ?? [];
+  const now = staying();
   return h("div", { class: "segments", role: "group", "aria-label": "Sides that stay" }, ...SIDES.map((side) => button({
     text: side[0].toUpperCase() + side.slice(1), pressed: now.includes(side),
     onclick: () => { draft.sides = now.includes(side) ? now.filter((s) => s !== side) : [...now, side]; renew(); emit("motion"); },
@@ -27,6 +33,7 @@ function handle() {
   const now = at(h0, player.time);
   return section(`Handle on ${h0.layer}`,
     slider({ label: "Size", min: 0.2, max: 3, step: 0.05, value: now.scale, neutral: 1, onchange: (v) => setKey(h0, { scale: v }) }),
+    slider({ label: "Turn", min: -180, max: 180, unit: "\u00b0", value: now.turn, neutral: 0, onchange: (v) => setKey(h0, { turn: v }) }),
     slider({ label: "Reach", min: 4, max: Math.round(Math.max(...store.state.size) / 3), unit: " px", value: h0.radius, onchange: (v) => { h0.radius = v; renew(); } }),
     h("div", { class: "bar" },
       button({ text: "Set a key", icon: "diamond", onclick: () => setKey(h0, {}) }),

@@ -2,7 +2,7 @@
 import { Puppet, attach } from "../arap.js";
 import { commit } from "../actions.js";
 import { s } from "../dom.js";
-import { apply, inverse } from "../matrix.js";
+import { apply } from "../matrix.js";
 import * as scene from "../scene.js";
 import { draw, tools, unrest, view } from "../stage.js";
 import { emit, hover, on, select, single, store } from "../store.js";
@@ -64,10 +64,7 @@ let waiting = false;
 function solve(full = false) {
   if (!work) return;
   const { puppet, targets, name } = work;
-  const z = puppet.drag(targets, full ? {} : { milliseconds: BUDGET, rounds: 2, warm: true });
-  const back = inverse(scene.matrixOf(name)), bent = new Float32Array(z.length);
-  for (let i = 0; i < z.length; i += 2) [bent[i], bent[i + 1]] = apply(back, z[i], z[i + 1]);
-  scene.preview.set(name, { ...scene.preview.get(name), bent });
+  scene.bend(name, puppet.drag(targets, full ? {} : { milliseconds: BUDGET, rounds: 2, warm: true }));
   draw();
 }
 

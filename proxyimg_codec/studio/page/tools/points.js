@@ -1,9 +1,11 @@
 /** Bézier points of an outline: shows and drags them, smooth or as corners. */
 import { commit } from "../actions.js";
 import { s } from "../dom.js";
+import { pathData } from "../bezier.js";
 import * as scene from "../scene.js";
 import { draw, tools, unrest, view } from "../stage.js";
 import { emit, hover, on, select, single, store } from "../store.js";
+import { follower } from "./follow.js";
 import { outlineNodes } from "./select.js";
 
 /** Chosen anchor: path and point, and whether the inside follows. @type {{path: number, point: number, follow: boolean}} */
@@ -11,7 +13,7 @@ export const anchor = { path: -1, point: -1, follow: false };
 
 /** Paths that are being dragged, in place of those of the server. @type {number[][][]|null} */
 let moving = null;
-/** @type {null | {path: number, point: number, start: any, before: number[][][], steps: Map<number, number[]>}} */
+/** @type {null | {path: number, point: number, start: any, before: number[][][], steps: Map<number, number[]>, kind?: boolean, bend?: ((dx: number, dy: number) => void) | null}} `kind`: smooth or corner, which moves nothing inside */
 let work = null;
 
 const paths = () => { const layer = single(); return moving ?? (layer ? scene.outline(layer.name) : null); };
@@ -41,6 +43,12 @@ function show(steps) {
   if (!work) return;
   work.steps = steps;
   moving = work.before.map((path, i) => (i !== work.path ? path : path.map((q, k) => { const d = steps.get(k); return d ? [q[0] + d[0], q[1] + d[1]] : q; })));
+  const name = single()?.name ?? "";
+  if (anchor.follow && !work.kind) {
+    if (work.bend === undefined) work.bend = follower(name, work.before, work.path, work.point);
+    const [dx, dy] = steps.get(work.point) ?? [0, 0];
+    work.bend?.(dx, dy);
+  } else scene.preview.set(name, { ...scene.preview.get(name), clip: moving });
   draw();
 }
 
@@ -64,12 +72,13 @@ function move(dx, dy, alone) {
 async function finish() {
   const done = work, layer = single();
   work = null;
-  if (!done || !layer || !done.steps.size) { moving = null; return draw(); }
-  const follow = anchor.follow ? { follow: true } : {};
+  if (!done || !layer || !done.steps.size) { if (layer) scene.preview.delete(layer.name); moving = null; return draw(); }
+  const along = anchor.follow && !done.kind, follow = along ? { follow: true } : {};
   const round = (/** @type {number} */ v) => Number(v.toFixed(2));
-  const edits = [...done.steps].filter(([k]) => !anchor.follow || k % 3 === 0 || done.point % 3).filter(([, d]) => Math.hypot(...d) > 0.01)
+  const edits = [...done.steps].filter(([k]) => !along || k % 3 === 0 || done.point % 3).filter(([, d]) => Math.hypot(...d) > 0.01)
     .map(([point, d]) => ({ op: "point", layer: layer.name, path: done.path, point, by: d.map(round), ...follow }));
-  await commit(edits, [layer.name]);
+  if (edits.length) await commit(edits, [layer.name]);
+  else scene.preview.delete(layer.name);
   await scene.outlineOf(layer.name).catch(() => {});
   moving = null;
   unrest();
@@ -84,7 +93,7 @@ export function setSmooth(even) {
   let d = [b[0] - a[0], b[1] - a[1]];
   if (Math.hypot(...d) < 1e-6) { const [u, v] = [path[wrap(path, k - 3)], path[wrap(path, k + 3)]]; d = [v[0] - u[0], v[1] - u[1]]; }
   const l = Math.hypot(...d) || 1, third = (/** @type {number} */ j) => { const q = path[wrap(path, j)]; return Math.hypot(q[0] - p[0], q[1] - p[1]) / 3; };
-  work = { path: anchor.path, point: k, start: null, before: shape, steps: new Map() };
+  work = { path: anchor.path, point: k, start: null, before: shape, steps: new Map(), kind: true };
   const wanted = even
     ? [[p[0] - (d[0] / l) * (la || third(k - 3)), p[1] - (d[1] / l) * (la || third(k - 3))], [p[0] + (d[0] / l) * (lb || third(k + 3)), p[1] + (d[1] / l) * (lb || third(k + 3))]]
     : [corner(p, path[wrap(path, k - 3)]), corner(p, path[wrap(path, k + 3)])];
@@ -105,7 +114,10 @@ tools.points = {
   hint: "Drag a point or its handles \u00b7 double-click makes a corner smooth or the other way \u00b7 Alt moves one handle alone",
   enter() {
     const layer = single();
-    if (layer) scene.outlineOf(layer.name).then(draw, () => {});
+    if (!layer) return;
+    scene.outlineOf(layer.name).then(draw, () => {});
+    scene.wholeOf(layer.name).catch(() => {});
+    scene.meshOf(layer.name).catch(() => {});
   },
   down(p) {
     const found = find(p), shape = paths();
@@ -124,7 +136,8 @@ tools.points = {
     if (found && found.point % 3 === 0) { anchor.path = found.path; anchor.point = found.point; setSmooth(!chosenSmooth()); }
   },
   escape() {
-    const was = Boolean(work);
+    const was = Boolean(work), layer = single();
+    if (layer) scene.preview.delete(layer.name);
     work = moving = null;
     draw();
     return was;
@@ -145,11 +158,11 @@ tools.points = {
     finish();
     return true;
   },
-  leave() { work = moving = null; },
+  leave() { tools.points.escape?.(); },
   overlay(add) {
     const shape = paths();
     if (!shape) return outlineNodes(add, false);
-    const d = scene.pathData(shape, (x, y) => view.toScreen(x, y));
+    const d = pathData(shape, (x, y) => view.toScreen(x, y));
     add(s("path", { d, class: "under" }));
     add(s("path", { d, class: "chosen" }));
     shape.forEach((path, i) => {

@@ -1,6 +1,7 @@
 /** Selects layers, and moves, scales, turns and slants what is selected. */
 import { commit } from "../actions.js";
 import { s } from "../dom.js";
+import { pathData } from "../bezier.js";
 import { about, apply, inverse, product, rotation } from "../matrix.js";
 import * as scene from "../scene.js";
 import { draw, tools, unrest, view } from "../stage.js";
@@ -159,7 +160,7 @@ tools.select = {
   hint: "Drag to move \u00b7 handles scale, Shift frees, Alt about the centre, Ctrl on a side slants \u00b7 the knob turns",
   down(p, e) {
     if (work?.kind === "nudge") { clearTimeout(nudging); finish(); }
-    const frame = frameOf(), found = frame && grip(frame, p);
+    const frame = frameOf(), found = frame && !scene.sway.size && grip(frame, p);
     if (found) return begin("turn" in found ? "turn" : "scale", p, found);
     const name = scene.hit(p.x, p.y);
     if (e.shiftKey) {
@@ -186,7 +187,7 @@ tools.select = {
     return true;
   },
   hover(p) {
-    const frame = frameOf(), found = frame && grip(frame, p);
+    const frame = frameOf(), found = frame && !scene.sway.size && grip(frame, p);
     if (found && "turn" in found) { hover(null); return "alias"; }
     if (found) {
       const [a, b] = [at(frame, 0.5, 0.5), at(frame, found.u, found.v)];
@@ -213,12 +214,12 @@ export function outlineNodes(add, handles) {
     const layer = name && layerOf(name), paths = layer && scene.outline(name);
     if (!paths || (name === store.state.layers[0].name && store.state.opaque)) continue;
     const lead = product(scene.matrixOf(name), inverse(layer.matrix));
-    if (scene.preview.get(name)?.bent) continue;
-    const d = scene.pathData(paths, (x, y) => view.toScreen(...apply(lead, x, y)));
+    if (scene.preview.get(name)?.bent || scene.sway.has(name)) continue;
+    const d = pathData(paths, (x, y) => view.toScreen(...apply(lead, x, y)));
     add(s("path", { d, class: "under" }));
     add(s("path", { d, class: name === store.hovered && !store.selected.has(name) ? "hovered" : "chosen" }));
   }
-  const frame = handles && !(work?.kind === "nudge") ? frameOf() : null;
+  const frame = handles && !scene.sway.size && !(work?.kind === "nudge") ? frameOf() : null;
   if (!frame || (store.state.opaque && store.selected.has(store.state.layers[0]?.name))) return;
   const corners = [[0, 0], [1, 0], [1, 1], [0, 1]].map(([u, v]) => view.toScreen(...at(frame, u, v)).join(","));
   add(s("polygon", { points: corners.join(" "), class: "under" }));
