@@ -59,9 +59,13 @@ class Progress:
         self._share = SHARE if done else 0.0
 
     def decode(self, needs: Sequence[tuple[Planes, Window]]) -> None:
-        """Decodes the samples of rasters that are needed, as for `decoding`."""
+        """Decodes the samples of rasters that are needed, as for `decoding`.
+
+        The largest windows come first: what small ones leave of them would be made in pieces, each
+        with what lies around it.
+        """
         with self.decoding(needs):
-            for planes, window in needs:
+            for planes, window in sorted(needs, key=lambda v: v[1].area, reverse=True):
                 planes.samples(window)
 
     @contextmanager
