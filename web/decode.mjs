@@ -58,6 +58,24 @@ function digest(image) {
   return hash.digest("hex");
 }
 
+const weights = new Map();
+let kept = { key: null }; // what was opened last: several views of a file are asked for one after the other
+
+/** A model's bytes, read once. */
+async function load(model) {
+  if (!weights.has(model)) weights.set(model, readFileSync(MODEL_FILES[model]));
+  return weights.get(model);
+}
+
+/** The picture of a file, and the function that draws it. */
+async function opened(path, wasm) {
+  const key = `${wasm} ${path}`;
+  if (kept.key === key) return kept;
+  const bytes = new Uint8Array(readFileSync(path));
+  const { Image, render } = await import(wasm ? "./pxi-wasm/index.js" : "./pxi/index.js");
+  return (kept = { key, image: await Image.open(bytes, load), render });
+}
+
 /** Runs one command line; returns its exit code. Nothing is written unless that is 0. */
 async function run(words) {
   let output = null;
@@ -66,9 +84,7 @@ async function run(words) {
     if (positionals.length !== (flags.latents ? 1 : 2)) throw new UsageError(USAGE);
     const bits = flags["bit-depth"] ?? "8";
     if (!["8", "16"].includes(bits)) throw new UsageError("--bit-depth must be 8 or 16");
-    const bytes = new Uint8Array(readFileSync(positionals[0]));
-    const { Image, render } = await import(flags.wasm && !flags.latents ? "./pxi-wasm/index.js" : "./pxi/index.js");
-    const image = await Image.open(bytes, async (model) => readFileSync(MODEL_FILES[model]));
+    const { image, render } = await opened(positionals[0], Boolean(flags.wasm && !flags.latents));
     if (image.plain) throw new UsageError("WebAssembly is not there: make -C libpxi/wasm");
     if (flags.latents) {
       console.log(digest(image));

@@ -193,6 +193,13 @@ PXI_API pxi_status pxi_measure(const pxi_file *file, const pxi_request *request,
 PXI_API pxi_status pxi_render(pxi_file *file, const pxi_request *request, void *pixels, size_t bytes, size_t stride,
                               pxi_error *error);
 
+/*
+ * For tests of decoders: all latents of planes, the integers that every decoder must have alike, in the order of
+ * PYR-29. `plane` is the number of a PLAN of the file, from 0; PXI_USAGE if there is none. `*count` tells how many
+ * numbers fit into `values`, which may be null, and becomes how many there are.
+ */
+PXI_API pxi_status pxi_latents(pxi_file *file, uint32_t plane, int32_t *values, size_t *count, pxi_error *error);
+
 #ifdef __cplusplus
 }
 #endif

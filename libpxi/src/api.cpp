@@ -40,7 +40,7 @@ template <class T> void fill(T *to, T value) {
 }
 
 // Makes no room for anything: memory may have ended.
-pxi_status told(pxi_error *to, uint32_t status, const char *rule, const char *message, Place at) {
+pxi_status told(pxi_error *to, uint32_t status, const char *rule, const char *message, const Place &at) {
     if (!to) return (pxi_status)status;
     pxi_error error = PXI_ERROR_INIT;
     error.size = to->size, error.status = status, error.offset = at.offset;
@@ -92,17 +92,9 @@ struct Hearing {  // of a caller, while a file is opened
 pxi_file *open(Bytes bytes, const pxi_options &options) {
     Limits limits;
     set_limits(limits, options.limits, options.limit_count);
-    FindModel find;
-    if (options.model)
-        find = [model = options.model, context = options.model_context](const char *name, Bytes *found) {
-            const void *at = nullptr;
-            size_t count = 0;
-            if (model(context, name, &at, &count) || !at) return false;
-            *found = {(const uint8_t *)at, count};
-            return true;
-        };
+    const FindModel find = {options.model, options.model_context};
     Hearing hearing = {options.progress, options.progress_context};
-    return new pxi_file{Image(bytes, limits, std::move(find), Watch{Hearing::ask, &hearing})};
+    return new pxi_file{Image(bytes, limits, find, Watch{Hearing::ask, &hearing})};
 }
 
 }  // namespace
@@ -209,10 +201,24 @@ pxi_status pxi_render(pxi_file *file, const pxi_request *request, void *pixels, 
         usage(stride >= row, "the stride is smaller than a row");
         usage(bytes >= row && (bytes - row) / stride >= rows - 1, "the buffer is too small");
         usage((uintptr_t)pixels % (pixel / 4) == 0 && stride % (pixel / 4) == 0, "the buffer is not aligned");
-        render(image, own, into(pixels, stride, asked.format, own.opaque(image)), [&](double share) {
+        render(image, own, {pixels, stride, asked.format, own.opaque(image)}, [&](double share) {
             if (asked.progress && asked.progress(asked.progress_context, share))
                 fail(Kind::STOPPED, "", "the caller asked to stop");
         });
+    });
+}
+
+pxi_status pxi_latents(pxi_file *file, uint32_t plane, int32_t *values, size_t *count, pxi_error *error) {
+    return guarded(error, [&] {
+        const Image &image = opened(file);
+        usage(plane < image.file->plans.size(), "there are no planes of this number");
+        usage(count, "an argument is null");
+        const size_t room = values ? *count : 0;
+        *count = image.textures->latent_count((int)plane);
+        usage(!values || room >= *count, "the buffer is too small");
+        if (!values) return;
+        const std::vector<int32_t> found = image.textures->latents((int)plane);
+        std::copy(found.begin(), found.end(), values);
     });
 }
 

@@ -22,10 +22,10 @@ static void check_counts(const File &f, Budget &budget) {
     std::set<std::string_view> names;
     for (const Layr &l : f.layers)
         need(names.insert(l.name).second, "CHK-5", "two layers have the same name", l.at);
-    for (const auto &[layer, mesh] : f.meshes)
-        need(layer < h.layers, "CHK-9", "a mesh of a layer that does not exist", mesh.at);
-    for (const auto &[layer, pose] : f.poses)
-        need(layer < h.layers, "CHK-10", "a pose of a layer that does not exist", pose.at);
+    for (const Mesh &mesh : f.meshes)
+        need(mesh.layer < h.layers, "CHK-9", "a mesh of a layer that does not exist", mesh.at);
+    for (const Pose &pose : f.poses)
+        need(pose.layer < h.layers, "CHK-10", "a pose of a layer that does not exist", pose.at);
 }
 
 static void check_layers(const File &f, Budget &budget) {
@@ -34,20 +34,20 @@ static void check_layers(const File &f, Budget &budget) {
         need(l.box[2] >= 1 && l.box[3] >= 1, "CHK-6", "the box is empty", l.at);
         supported(l.sampling <= 3, "CHK-7", "the sampling is not known", l.at);
         const bool nodes = l.sampling == 1 || l.sampling == 2;
-        need(!nodes || f.meshes.count(k), "CHK-7", "node sampling needs a mesh", l.at);
+        need(!nodes || of_layer(f.meshes, k), "CHK-7", "node sampling needs a mesh", l.at);
         const bool bare = !l.unit && l.classes.empty() && l.deltas.empty();
         need(!l.segments.empty() || bare, "CHK-8", "a layer without segments has a boundary", l.at);
         for (const int count : l.segments) budget.spend(SEGMENTS, count);
     }
-    for (const auto &[layer, mesh] : f.meshes) budget.spend(GATES, mesh.gates);
+    for (const Mesh &mesh : f.meshes) budget.spend(GATES, mesh.gates);
 }
 
 static void check_poses(const File &f) {
-    for (const auto &[layer, p] : f.poses) {
+    for (const Pose &p : f.poses) {
         const auto &[a, b, c, d] = p.matrix;  // products of less than 2**62
         need(a * d != b * c, "POS-2", "the matrix is singular", p.at);
         need(p.colour.empty() || p.colour.size() == 12, "CHK-11", "a colour matrix has 12 items", p.at);
-        const bool meshed = f.meshes.count(layer);
+        const bool meshed = of_layer(f.meshes, p.layer);
         for (const auto &[classes, deltas] : {std::pair{p.node_classes, p.node_deltas},
                                               std::pair{p.place_classes, p.place_deltas}}) {
             need(!classes.empty() || deltas.empty(), "POS-1", "displacements have no classes", p.at);
@@ -217,7 +217,7 @@ static void check_motion(const File &f, Budget &budget) {
     int least = f.head.opaque ? 1 : 0;
     for (const int layer : m.layers) {
         need(layer >= least, "MOT-1", "layers of a motion do not ascend, or the opaque back layer moves", m.at);
-        need(f.meshes.count(layer), "MOT-1", "a layer moves that has no mesh", m.at);
+        need(of_layer(f.meshes, layer), "MOT-1", "a layer moves that has no mesh", m.at);
         least = layer + 1;
     }
     need((m.size == 0) == m.script.empty(), "MOT-1", "the script and its size do not fit", m.at);

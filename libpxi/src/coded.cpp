@@ -13,7 +13,7 @@ static uint32_t u32(Bytes data, size_t at) {
     return data[at] | data[at + 1] << 8 | data[at + 2] << 16 | (uint32_t)data[at + 3] << 24;
 }
 
-size_t stream_size(Bytes data, Place at) {
+size_t stream_size(Bytes data, const Place &at) {
     need(!data.empty() && data[0] <= 10, "ENT-4", "a stream has too many lanes, or none", at);
     const size_t head = 5 + ((size_t)4 << data[0]);
     need(data.size() >= head, "ENT-4", "a stream ends in its states", at);
@@ -22,7 +22,7 @@ size_t stream_size(Bytes data, Place at) {
     return (size_t)size;
 }
 
-Stream::Stream(Bytes data, Place at) : size(stream_size(data, at)), at(at) {
+Stream::Stream(Bytes data, const Place &at) : size(stream_size(data, at)), at(at) {
     states.resize((size_t)1 << data[0]);
     for (size_t i = 0; i < states.size(); i++) {
         states[i] = u32(data, 1 + 4 * i);
@@ -53,7 +53,7 @@ class Bits {
     Place at;
 
   public:
-    Bits(Bytes data, Place at) : data(data), at(at) {}
+    Bits(Bytes data, const Place &at) : data(data), at(at) {}
     uint32_t take(int count) {
         need(next + count <= 8 * (uint64_t)data.size(), "ENT-16", "raw bits end early", at);
         uint32_t value = 0;
@@ -88,7 +88,7 @@ struct Waves {
 }  // namespace
 
 std::vector<uint8_t> decode_array(Bytes data, int channels, int height, int width, int bits,
-                                  const uint8_t *stored, Place at) {
+                                  const uint8_t *stored, const Place &at) {
     const int high = std::min(bits, MODEL_BITS), low = bits - high;
     const int64_t size = (int64_t)height * width;
     const int64_t count = stored ? size - std::count(stored, stored + size, 0) : size;
@@ -116,14 +116,14 @@ std::vector<uint8_t> decode_array(Bytes data, int channels, int height, int widt
     return out;
 }
 
-std::vector<uint8_t> decode_mask(Bytes data, int height, int width, const char *rule, Place at) {
+std::vector<uint8_t> decode_mask(Bytes data, int height, int width, const char *rule, const Place &at) {
     std::vector<uint8_t> mask = decode_array(data, 1, height, width, 1, nullptr, at);
     const size_t ones = std::count(mask.begin(), mask.end(), 1);
     need(ones && ones < mask.size(), rule, "a mask has only one value", at);
     return mask;
 }
 
-std::vector<int32_t> decode_signed(Bytes classes, Bytes deltas, int channels, int height, int width, Place at) {
+std::vector<int32_t> decode_signed(Bytes classes, Bytes deltas, int channels, int height, int width, const Place &at) {
     const std::vector<uint8_t> sizes = decode_array(classes, channels, height, width, 4, nullptr, at);
     Bits raw(deltas, at);
     std::vector<int32_t> out(sizes.size());
@@ -144,7 +144,7 @@ std::vector<int32_t> decode_signed(Bytes classes, Bytes deltas, int channels, in
     return out;
 }
 
-Bytes take_array(Bytes data, size_t *next, const char *rule, Place at) {
+Bytes take_array(Bytes data, size_t *next, const char *rule, const Place &at) {
     need(data.size() - *next >= 4, rule, "a length is missing", at);
     const uint32_t length = u32(data, *next);
     need(length <= data.size() - *next - 4, rule, "a coded array ends early", at);

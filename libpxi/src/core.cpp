@@ -4,7 +4,7 @@
 
 #define PXI_FUNCTIONS(X)                                                                                    \
     X(decode) X(pyramid_lowest) X(pyramid_level) X(next_plain) X(pyramid_synthesis) X(forward) X(sample)   \
-    X(coloured) X(coverage) X(diffused) X(completed) X(blend) X(premultiplied) X(finished)
+    X(coloured) X(shown) X(coverage) X(diffused) X(completed) X(blend) X(premultiplied) X(finished)
 
 // Symbols of all levels; their types are those of Core.
 #define PXI_DECLARE(name, level) extern std::remove_pointer_t<decltype(pxi::Core::name)> pxi_##name##_##level;
@@ -40,7 +40,7 @@ const Core &core() {
 #endif
 }
 
-void check_core(int wrong, Place at) {
+void check_core(int wrong, const Place &at) {
     using namespace loops;
     need(wrong != STREAM_ENDS, "ENT-6", "a stream ends too early", at);
     need(wrong != ESCAPES_END, "PYR-13", "the list of escapes is cut off or corrupt", at);

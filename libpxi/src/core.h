@@ -35,6 +35,7 @@ struct Core {
     void (*forward)(const Net *, const float *, const float *, const Entries *, int64_t, float *);
     void (*sample)(const float *, int64_t, int32_t, const loops::Points *, float *);
     void (*coloured)(const float *, const float *, int64_t, float *);
+    void (*shown)(const float *, const float *, int64_t, float *);
     int (*coverage)(loops::Cover *, const int64_t *, const int64_t *, int64_t);
     int (*diffused)(const loops::Plane *, const uint8_t *);
     int (*completed)(loops::Copies *);
@@ -47,6 +48,6 @@ struct Core {
 const Core &core();
 
 // Refuses what a function of the core says that went wrong.
-void check_core(int wrong, Place at);
+void check_core(int wrong, const Place &at);
 
 }  // namespace pxi

@@ -11,7 +11,7 @@ namespace pxi {
 static const int FRACTION = 256;  // units of a code while it is filled (TEX-5)
 
 // float16 numbers, finite and perhaps positive (TEX-3, TEX-16).
-static std::vector<float> halves(Bytes data, int64_t count, bool positive, const char *rule, Place at) {
+static std::vector<float> halves(Bytes data, int64_t count, bool positive, const char *rule, const Place &at) {
     need((int64_t)data.size() == 2 * count, rule, "the number of steps or biases is wrong", at);
     std::vector<float> out(count);
     for (int64_t i = 0; i < count; i++) {

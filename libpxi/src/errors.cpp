@@ -1,21 +1,20 @@
 #include "errors.h"
 
 #include <new>
-#include <utility>
 
 namespace pxi {
 
 #if __cpp_exceptions
-void fail(Kind kind, const char *rule, std::string message, const Place &at) {
-    throw Failure{kind, rule, std::move(message), at};
+void fail(Kind kind, const char *rule, const char *message, const Place &at) {
+    throw Failure{kind, rule, message, at};
 }
 void out_of_memory() { throw std::bad_alloc(); }
 #else
 // The host of a WebAssembly module: it takes note, and gives the instance up.
 extern "C" [[noreturn]] __attribute__((import_module("pxi"), import_name("failed"))) void pxi_failed(
     int kind, const char *rule, const char *message, const char *chunk, int64_t offset);
-void fail(Kind kind, const char *rule, std::string message, const Place &at) {
-    pxi_failed((int)kind, rule, message.c_str(), at.chunk, at.offset);
+void fail(Kind kind, const char *rule, const char *message, const Place &at) {
+    pxi_failed((int)kind, rule, message, at.chunk, at.offset);
 }
 void out_of_memory() { fail(Kind::LIMIT, "", "there is not enough memory"); }
 #endif

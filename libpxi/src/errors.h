@@ -29,7 +29,7 @@ struct Failure {
 };
 
 // Throws; without exceptions (WebAssembly) it calls `pxi_failed` of the host, which never returns.
-[[noreturn]] void fail(Kind kind, const char *rule, std::string message, const Place &at = {});
+[[noreturn]] void fail(Kind kind, const char *rule, const char *message, const Place &at = {});
 
 // Throws as `new` does; ends the instance without exceptions.
 [[noreturn]] void out_of_memory();

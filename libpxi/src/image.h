@@ -14,8 +14,8 @@ struct Image {
     Budget budget;                  // of reading
     std::unique_ptr<File> file;
     std::vector<Boundary> boundaries;
-    std::map<int, Refined> meshes;  // by layer, as what follows
-    std::map<int, Points> moved, places;  // displacements by poses in 1/16 pixel, where there are any
+    std::vector<Refined> meshes;        // by layer, as what follows; without faces where there is none
+    std::vector<Points> moved, places;  // displacements by poses in 1/16 pixel; none where there are none
     std::optional<Motion> motion;
     std::unique_ptr<Textures> textures;
 
@@ -23,8 +23,7 @@ struct Image {
     Image(Bytes bytes, const Limits &limits, FindModel models, const Watch &watch);
 
     const Refined *mesh(int layer) const {
-        const auto found = meshes.find(layer);
-        return found == meshes.end() ? nullptr : &found->second;
+        return meshes[layer].faces.empty() ? nullptr : &meshes[layer];
     }
 };
 

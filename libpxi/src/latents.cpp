@@ -31,9 +31,10 @@ Latents::Latents(const Plan &plan, const Weights &weights, const Watch &watch)
     : plan(plan), weights(weights), watch(watch), grid(plan), cells(support_of(plan)), read(plan.levels + 1) {}
 
 void Latents::forget() {
-    levels.clear(), plains.clear(), made.clear(), coded.clear(), tiles.clear();
+    levels = {}, plains = {}, made = {}, coded = {}, tiles = {};
     lowest_planes = {};
     first.reset();
+    read = grid.levels + 1;
     indexed = false;
 }
 
@@ -61,7 +62,7 @@ const std::vector<int32_t> &Latents::lowest() {
 
 // Decodes a level, or a part of it.
 void Latents::decode(LatentStream &stream, int level, Shape shape, const int32_t *low, const int32_t *parent,
-                     const uint8_t *bands, int32_t *out) const {
+                     const uint8_t *bands, int32_t *out, const Watch &heard) const {
     const Context &c = weights.context_of(level);
     std::vector<int32_t> bias = c.first_bias;
     for (size_t i = 0; i < bias.size(); i++) bias[i] += (c.first_by_step[i] * (plan.step - STEP_ORIGIN) + 128) >> 8;
@@ -78,13 +79,17 @@ void Latents::decode(LatentStream &stream, int level, Shape shape, const int32_t
     for (int k = 0; k < 2; k++) task.shifts[k] = plan.shifts[2 * level - 2 + k] - SHIFT_ORIGIN;
     task.logs = log_features().data(), task.n_logs = (int64_t)log_features().size();
     task.low = low, task.parent = parent, task.bands = bands, task.latents = out;
-    const Listening hearing(watch);
-    task.watch = hearing.function();
+    task.watch = heard.function, task.listener = heard.user;
     check_core(core().pyramid_level(&task), plan.at);
     stream.advance(task.source);
 }
 
-void Latents::read_level(int level) {
+void Latents::prepare(int level) {
+    const Window whole = Window::whole(grid.at(level));
+    plain(level, whole), this->level(level + 1, whole.halved());
+}
+
+void Latents::read_level(int level, Arrival *arrival) {
     const Shape shape = grid.at(level);
     const Window whole = Window::whole(shape);
     const int32_t *low = plain(level, whole), *parent = this->level(level + 1, whole.halved());
@@ -92,7 +97,13 @@ void Latents::read_level(int level) {
     LatentStream stream = std::move(*first);
     first.reset();  // it is of no use after an error
     levels[level].make(9 * shape.size());
-    decode(stream, level, shape, low, parent, some, levels[level].data());
+    int32_t *out = levels[level].data();
+#ifdef PXI_NO_THREADS
+    decode(stream, level, shape, low, parent, some, out, watch);
+#else
+    if (arrival) arrival->begin(out);
+    decode(stream, level, shape, low, parent, some, out, arrival ? arrival->watch() : watch);
+#endif
     if (level == 1 || !grid.tiles(level - 1, plan.tile).empty()) stream.finish();
     first.emplace(std::move(stream));
     read = level;
@@ -105,7 +116,7 @@ const int32_t *Latents::level(int level, Window window) {
     if (!levels[level]) levels[level].make(9 * shape.size());
     if (above) return levels[level].data();
     if (grid.tiles(level, plan.tile).empty()) {
-        lowest();
+        if (read > level) lowest();
         while (read > level) read_level(read - 1);
         return levels[level].data();
     }
@@ -140,7 +151,7 @@ void Latents::read_tiles(int level, const std::vector<Tile> &wanted) {
         paste(coded, shape, tile.at, some.data(), outer.shape(), tile.at.inside(outer), 1);
         std::vector<int32_t> found(9 * outer.shape().size());
         LatentStream stream(tile.data, tile.escapes, plan.at);
-        decode(stream, level, outer.shape(), own.data(), above.data(), some.data(), found.data());
+        decode(stream, level, outer.shape(), own.data(), above.data(), some.data(), found.data(), watch);
         stream.finish();
         paste(found.data(), outer.shape(), tile.at.inside(outer), out, shape, tile.at, 9);
     });
@@ -172,7 +183,7 @@ void Latents::index() {
     if (indexed) return;
     const std::vector<Tile> streams = split();
     size_t next = 0;
-    tiles.clear();
+    tiles = {};
     for (int level = grid.levels; level > 0; level--)
         for (const Window &at : grid.tiles(level, plan.tile)) {
             const std::vector<uint8_t> own = cut(bands(level).data(), 1, grid.at(level), at);

@@ -1,9 +1,10 @@
 // Latents of a raster, decoded as far as they are asked for: levels, and tiles of them (chapter 8).
 #pragma once
 
-#include <map>
+#include <atomic>
 #include <optional>
 
+#include "arrival.h"
 #include "coded.h"
 #include "core.h"
 #include "models.h"
@@ -33,7 +34,7 @@ class LatentStream {
     Place at;
 
   public:
-    LatentStream(Bytes data, Bytes escapes, Place at) : stream(data, at), data(data), escapes(escapes), at(at) {}
+    LatentStream(Bytes data, Bytes escapes, const Place &at) : stream(data, at), data(data), escapes(escapes), at(at) {}
     loops::Source source();
     void advance(const loops::Source &to);
     void finish() const;
@@ -46,22 +47,23 @@ class Latents {
     const Grid grid;
     std::vector<uint8_t> cells;  // that have latents; empty: all
     std::vector<int32_t> lowest_planes;
-    std::map<int, Zeros<int32_t>> levels, plains;  // by level
-    std::map<int, Made> made;                      // of `plains`
-    std::map<int, std::vector<uint8_t>> coded;
+    ByLevel<Zeros<int32_t>> levels, plains;
+    ByLevel<Made> made;  // of `plains`
+    ByLevel<std::vector<uint8_t>> coded;
     std::optional<LatentStream> first;  // the stream of all that has no tiles
-    int read;                           // the finest level that it was read of
+    std::atomic<int> read;              // the finest level that it was read of
     struct Tile {
         Window at;
         Bytes escapes, data;
     };
     bool indexed = false;
-    std::map<int, std::vector<Tile>> tiles;  // that are not read yet
+    ByLevel<std::vector<Tile>> tiles;  // that are not read yet
 
     const std::vector<uint8_t> &bands(int level);
     void decode(LatentStream &stream, int level, Shape shape, const int32_t *low, const int32_t *parent,
-                const uint8_t *bands, int32_t *out) const;
-    void read_level(int level);
+                const uint8_t *bands, int32_t *out, const Watch &heard) const;
+    // Reads one more level; `arrival`, which may be null, hears of its rows.
+    void read_level(int level, Arrival *arrival = nullptr);
     void read_tiles(int level, const std::vector<Tile> &wanted);
     void index();
     std::vector<Tile> split() const;
@@ -73,6 +75,12 @@ class Latents {
     const int32_t *level(int level, Window window);     // [9][h][w], of which the window is decoded
     const int32_t *plain(int level, Window window);     // [3][h][w] in 1/16, of which the window is made
     void forget();
+
+    // Whether a level that is not read yet is one stream, so that it can be read while its first rows are used.
+    bool flows(int level) const { return grid.tiles(level, plan.tile).empty() && read > level; }
+    // Reads all that such a level needs; then the level, while another thread may ask for coarser ones.
+    void prepare(int level);
+    void read_into(int level, Arrival &arrival) { read_level(level, &arrival); }
 };
 
 // Which cells of a plan have latents; empty: all (PYR-5).

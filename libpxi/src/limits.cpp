@@ -39,10 +39,20 @@ int Limits::find(const char *name) {
     return -1;
 }
 
+// A number that is not negative, in decimal digits.
+static std::string digits(int64_t value) {
+    std::string out;
+    do out.insert(out.begin(), (char)('0' + value % 10));
+    while (value /= 10);
+    return out;
+}
+
 void Budget::check(Limit limit, int64_t value) const {
-    if (value > limits.at[limit])
-        fail(Kind::LIMIT, "SEC-2", std::string(Limits::name(limit)) + ": " + std::to_string(value) +
-                                       " exceeds the limit of " + std::to_string(limits.at[limit]));
+    if (value <= limits.at[limit]) return;
+    std::string message = Limits::name(limit);
+    message += ": ", message += digits(value);
+    message += " exceeds the limit of ", message += digits(limits.at[limit]);
+    fail(Kind::LIMIT, "SEC-2", message.c_str());
 }
 
 void Budget::spend(Limit limit, int64_t amount) {

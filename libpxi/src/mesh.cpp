@@ -1,8 +1,7 @@
 #include "mesh.h"
 
 #include <algorithm>
-#include <unordered_map>
-#include <unordered_set>
+#include <map>
 
 #include "coded.h"
 #include "geometry.h"
@@ -42,8 +41,7 @@ class Base {
     std::vector<int32_t> residuals;
     size_t used = 0, used_far = 0;
     int known = 0;
-    std::unordered_set<uint64_t> edges;              // directed
-    std::unordered_map<uint64_t, int32_t> near;      // of the open gates
+    std::map<uint64_t, int32_t> edges;  // directed; the third vertex of those that are open gates, -1 of others
     std::vector<uint64_t> queue;
     Open open;
 
@@ -75,11 +73,11 @@ class Base {
 
     void pass_gates() {
         for (size_t at = 0; at < queue.size(); at++) {
-            const auto found = near.find(queue[at]);
-            if (found == near.end()) continue;
             const int32_t gate[2] = {(int32_t)(queue[at] >> 32), (int32_t)queue[at]};
-            const int x = gate[0], y = gate[1], n = found->second;
-            close(queue[at]);
+            int32_t &third = edges[queue[at]];
+            const int x = gate[0], y = gate[1], n = third;
+            if (n < 0) continue;
+            close(x, y, third);
             const int32_t *p = points.data();
             const int z = vertex(p[2 * x] + p[2 * y] - p[2 * n], p[2 * x + 1] + p[2 * y + 1] - p[2 * n + 1], gate);
             if (z >= 0) add(y, x, z);
@@ -129,25 +127,27 @@ class Base {
         const int at[5] = {a, b, c, a, b};
         for (int i = 0; i < 3; i++) {
             const int x = at[i], y = at[i + 1];
-            need(edges.insert(edge(x, y)).second, "MSH-2", "triangles of a mesh overlap", mesh.at);
-            if (near.contains(edge(y, x)))
-                close(edge(y, x));
-            else if (!edges.contains(edge(y, x))) {
-                near[edge(x, y)] = at[i + 2];
+            const auto [own, fresh] = edges.insert({edge(x, y), -1});
+            need(fresh, "MSH-2", "triangles of a mesh overlap", mesh.at);
+            const auto back = edges.find(edge(y, x));
+            if (back == edges.end()) {
+                own->second = at[i + 2];
                 queue.push_back(edge(x, y));
                 open.add(x), open.add(y);
+            } else if (back->second >= 0) {
+                close(y, x, back->second);
             }
         }
         triangles.push_back({a, b, c});
     }
 
-    void close(uint64_t gate) {
-        near.erase(gate);
-        open.drop((int)(gate >> 32)), open.drop((int)(uint32_t)gate);
+    void close(int x, int y, int32_t &third) {
+        third = -1;
+        open.drop(x), open.drop(y);
     }
 };
 
-typedef std::unordered_map<uint64_t, int32_t> Middles;  // nodes between two others
+typedef std::map<uint64_t, int32_t> Middles;  // nodes between two others
 
 struct Child {  // a triangle, and the one of the base that it is a part of
     int home;
@@ -166,17 +166,12 @@ void four(const Child &whole, const Middles &middles, std::vector<Child> &out) {
 }
 
 void add_middles(const std::vector<Child> &split, Middles &middles, Refined &to) {  // MSH-12
-    std::vector<uint64_t> fresh;
     for (const Child &child : split)
-        for (int i = 0; i < 3; i++) {
-            const uint64_t p = pair(child.t[i], child.t[(i + 1) % 3]);
-            if (!middles.contains(p)) fresh.push_back(p);
-        }
-    std::sort(fresh.begin(), fresh.end());
-    fresh.erase(std::unique(fresh.begin(), fresh.end()), fresh.end());
-    for (const uint64_t p : fresh) {
+        for (int i = 0; i < 3; i++) middles.insert({pair(child.t[i], child.t[(i + 1) % 3]), -1});
+    for (auto &[p, middle] : middles) {
+        if (middle >= 0) continue;
         const int32_t a = (int32_t)(p >> 32), b = (int32_t)p;
-        middles[p] = to.count();
+        middle = to.count();
         for (int axis = 0; axis < 2; axis++) to.nodes.push_back((to.nodes[2 * a + axis] + to.nodes[2 * b + axis]) >> 1);
         to.ends.push_back(a), to.ends.push_back(b);
     }
@@ -196,7 +191,7 @@ void divide(const Child &child, const int32_t *halves, int count, const Middles 
         for (const Face &t : {Face{d, b, e}, Face{a, d, c}, Face{d, e, c}}) out.push_back({child.home, t});
 }
 
-std::vector<Face> closed(std::vector<Child> triangles, const Middles &middles) {
+std::vector<Face> closed(std::vector<Child> triangles, int homes, const Middles &middles) {
     std::vector<Child> found;
     while (!triangles.empty()) {
         std::vector<Child> parts[3];
@@ -214,10 +209,12 @@ std::vector<Face> closed(std::vector<Child> triangles, const Middles &middles) {
         triangles = std::move(parts[0]);
         for (int i = 1; i < 3; i++) triangles.insert(triangles.end(), parts[i].begin(), parts[i].end());
     }
-    std::stable_sort(found.begin(), found.end(), [](const Child &a, const Child &b) { return a.home < b.home; });
-    std::vector<Face> out;
-    out.reserve(found.size());
-    for (const Child &child : found) out.push_back(child.t);
+    // By homes; those of one home stay in their order.
+    std::vector<size_t> next(homes + 1);
+    for (const Child &child : found) next[child.home + 1]++;
+    for (int k = 0; k < homes; k++) next[k + 1] += next[k];
+    std::vector<Face> out(found.size());
+    for (const Child &child : found) out[next[child.home]++] = child.t;
     return out;
 }
 
@@ -227,12 +224,14 @@ Refined decode_mesh(const Mesh &mesh, Budget &budget) {
     Refined out;
     Middles middles;
     std::vector<Child> whole, triangles, split;
+    int homes;
     {
         const Base base(mesh);
         for (size_t i = 0; i < base.points.size(); i++)
             out.nodes.push_back((int64_t)1024 * mesh.origin[i & 1] + (int64_t)base.points[i] * mesh.step[i & 1]);
         for (size_t i = 0; i < base.points.size(); i++) out.ends.push_back((int32_t)(i >> 1));
-        for (size_t i = 0; i < base.triangles.size(); i++) triangles.push_back({(int)i, base.triangles[i]});
+        homes = (int)base.triangles.size();
+        for (int i = 0; i < homes; i++) triangles.push_back({i, base.triangles[i]});
     }
     size_t next = 0;
     for (int level = 0; level < mesh.levels; level++) {
@@ -248,7 +247,7 @@ Refined decode_mesh(const Mesh &mesh, Budget &budget) {
     }
     need(next == mesh.splits.size(), "MSH-11", "split flags are left over", mesh.at);
     whole.insert(whole.end(), triangles.begin(), triangles.end());
-    out.faces = closed(std::move(whole), middles);
+    out.faces = closed(std::move(whole), homes, middles);
     return out;
 }
 

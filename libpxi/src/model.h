@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cstdint>
-#include <map>
 #include <span>
 #include <string>
 #include <vector>
@@ -98,13 +97,24 @@ struct Block {        // of metadata, decompressed
     std::vector<uint8_t> bytes;
 };
 
+// Which of some items, by ascending layers, is that of a layer; null if none is.
+template <class Item> const Item *of_layer(const std::vector<Item> &items, int layer) {
+    size_t low = 0, high = items.size();
+    while (low < high) {
+        const size_t middle = (low + high) / 2;
+        if (items[middle].layer < layer) low = middle + 1;
+        else high = middle;
+    }
+    return low < items.size() && items[low].layer == layer ? &items[low] : nullptr;
+}
+
 struct File {
     std::vector<uint8_t> bytes;  // that the rest points into, so a File is never copied
     int minor;                   // version
     Head head;
     std::vector<Layr> layers;
-    std::map<int, Mesh> meshes;  // by layer
-    std::map<int, Pose> poses;
+    std::vector<Mesh> meshes;  // by ascending layers, of some of them
+    std::vector<Pose> poses;   // likewise
     std::vector<Netw> networks;
     std::vector<Texr> textures;
     std::vector<Plan> plans;
@@ -112,15 +122,14 @@ struct File {
     Motn motion = {};
     std::vector<Block> blocks;
     int primaries = 0, transfer = 0;  // of cICp; 0 without it
-    std::string encoder, settings;    // of iNFO
     Pose rest;
 
     File() = default;
     File(File &&) = default;
     File &operator=(File &&) = default;
     const Pose &pose(int layer) const {
-        const auto found = poses.find(layer);
-        return found == poses.end() ? rest : found->second;
+        const Pose *found = of_layer(poses, layer);
+        return found ? *found : rest;
     }
     // The number of the texture that a layer shows.
     int source(int layer) const { return textures[layer].coder == SHARED ? textures[layer].texture : layer; }

@@ -9,23 +9,22 @@ namespace pxi {
 #ifndef PXI_NO_MODELS
 extern "C" const unsigned char pxi_pyramid_1[];
 extern "C" const size_t pxi_pyramid_1_size;
-static bool built_in(const char *, Bytes *found) {
-    *found = {pxi_pyramid_1, pxi_pyramid_1_size};
-    return true;
+static int built_in(void *, const char *, const void **bytes, size_t *count) {
+    *bytes = pxi_pyramid_1, *count = pxi_pyramid_1_size;
+    return 0;
 }
 #else
-static bool built_in(const char *, Bytes *) { return false; }
+static int built_in(void *, const char *, const void **, size_t *) { return 1; }
 #endif
 
 namespace {
 
 struct Registration {
-    int number;
-    const char *file;
+    int number, file;
     bool padded;
 };
-static const char FIRST[] = "pyramid-1.bin";
-static const Registration REGISTERED[] = {{1, FIRST, true}, {2, FIRST, false}};
+static const char *const FILE_NAMES[] = {"pyramid-1.bin"};
+static const Registration REGISTERED[] = {{1, 0, true}, {2, 0, false}};
 
 }  // namespace
 
@@ -141,10 +140,12 @@ const Weights &Models::of(int number) {
     const Registration *entry = registration(number);
     std::unique_ptr<Weights> &weights = loaded[entry->file];
     if (!weights) {
-        Bytes data;
-        const bool there = find ? find(entry->file, &data) : built_in(entry->file, &data);
+        const void *bytes = nullptr;
+        size_t count = 0;
+        const auto function = find.function ? find.function : built_in;
+        const bool there = !function(find.context, FILE_NAMES[entry->file], &bytes, &count) && bytes;
         supported(there, "PYR-35", "the weights of the model are not at hand");
-        weights = read(data);
+        weights = read({(const uint8_t *)bytes, count});
     }
     return *weights;
 }

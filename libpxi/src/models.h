@@ -1,8 +1,6 @@
 // Registered models of the pyramid coder (PYR-35 to PYR-37): their weights are no part of a file.
 #pragma once
 
-#include <functional>
-#include <map>
 #include <memory>
 #include <vector>
 
@@ -32,17 +30,20 @@ struct Weights {
     const Synthetic &synthesis_of(int level) const { return syntheses[std::min(level, LEVEL_SETS) - 1]; }
 };
 
-// Finds the bytes of a model's file, such as "pyramid-1.bin"; the bytes need to live during the call
-// only. False if it has none.
-typedef std::function<bool(const char *file, Bytes *found)> FindModel;
+// Finds the bytes of a model's file by its name, as `model` of pxi_options does.
+struct FindModel {
+    int (*function)(void *context, const char *file, const void **bytes, size_t *count) = nullptr;
+    void *context = nullptr;
+};
 
 class Models {
+    static constexpr int FILES = 1;
     FindModel find;
-    std::map<const char *, std::unique_ptr<Weights>> loaded;  // by file
+    std::unique_ptr<Weights> loaded[FILES];
 
   public:
-    // Without `find`, the models that are built into the library.
-    explicit Models(FindModel find = {}) : find(std::move(find)) {}
+    // Without a function, the models that are built into the library.
+    explicit Models(FindModel find = {}) : find(find) {}
     static bool registered(int number);
     static bool padded(int number);  // whether planes are those of a raster padded to multiples of 2**levels
     const Weights &of(int number);   // loads what is registered

@@ -1,8 +1,6 @@
 // Chapter 10: how the nodes of layers move over time.
 #pragma once
 
-#include <map>
-
 #include "pose.h"
 
 namespace pxi {
@@ -15,11 +13,11 @@ class Motion {
     std::vector<int32_t> shapes;     // [x, y][modes][nodes of all layers]
 
   public:
-    // Decodes and checks the trajectory. `motn` must outlive it.
-    Motion(const Motn &motn, const std::map<int, Refined> &meshes, Budget &budget);
+    // Decodes and checks the trajectory. `motn` must outlive it; `meshes` are those of all layers.
+    Motion(const Motn &motn, const std::vector<Refined> &meshes, Budget &budget);
 
-    // Displacements of the nodes of each layer that moves, x0, y0, .. in 1/1024 pixel (MOT-7).
-    std::map<int, Points> at(int64_t microseconds) const;
+    // Displacements of the nodes of all `layers`, x0, y0, .. in 1/1024 pixel (MOT-7); none of those that do not move.
+    std::vector<Points> at(int64_t microseconds, size_t layers) const;
 };
 
 }  // namespace pxi

@@ -27,14 +27,6 @@ template <> void put_row(const float *from, int channels, int n, bool opaque, fl
     }
 }
 
-template <class Number> Put putting(void *pixels, size_t stride, bool opaque) {
-    return [=](const Box &box, const float *samples, int channels) {
-        for (int y = 0; y < box.height; y++, samples += (size_t)box.width * channels)
-            put_row(samples, channels, box.width, opaque,
-                    (Number *)((char *)pixels + (box.y + y) * stride) + (size_t)4 * box.x);
-    };
-}
-
 }  // namespace
 
 size_t pixel_bytes(uint32_t format) {
@@ -42,10 +34,13 @@ size_t pixel_bytes(uint32_t format) {
     return format == PXI_RGBA8 ? 4 : format == PXI_RGBA16 ? 8 : 16;
 }
 
-Put into(void *pixels, size_t stride, uint32_t format, bool opaque) {
-    if (format == PXI_RGBA8) return putting<uint8_t>(pixels, stride, opaque);
-    if (format == PXI_RGBA16) return putting<uint16_t>(pixels, stride, opaque);
-    return putting<float>(pixels, stride, opaque);
+void Pixels::put(const Box &box, const float *samples, int channels) const {
+    char *to = (char *)at + box.y * stride + box.x * pixel_bytes(format);
+    for (int y = 0; y < box.height; y++, samples += (size_t)box.width * channels, to += stride) {
+        if (format == PXI_RGBA8) put_row(samples, channels, box.width, opaque, (uint8_t *)to);
+        if (format == PXI_RGBA16) put_row(samples, channels, box.width, opaque, (uint16_t *)to);
+        if (format == PXI_RGBAF) put_row(samples, channels, box.width, opaque, (float *)to);
+    }
 }
 
 }  // namespace pxi

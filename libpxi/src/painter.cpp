@@ -13,19 +13,11 @@ constexpr int TAPS = 4, CHUNK = 4096;  // samples that a point is interpolated f
 constexpr double NEAR = 1e-4;          // least squared distance to an anchor
 enum Sampling { DIRECT, BOTH, LOCAL, GLOBAL };
 
-const Points *found(const std::map<int, Points> &all, int layer) {
-    const auto at = all.find(layer);
-    return at == all.end() ? nullptr : &at->second;
-}
-
-// Displacements in 1/1024 pixel: those of a pose, in 1/16, and of a motion (MOT-8); either may be null.
-Points added(const Points *posed, const Points *swayed) {
-    Points out;
-    if (posed)
-        for (const int64_t v : *posed) out.push_back(64 * v);
-    if (!swayed) return out;
-    out.resize(swayed->size());
-    for (size_t i = 0; i < out.size(); i++) out[i] += (*swayed)[i];
+// Displacements in 1/1024 pixel: those of a pose, in 1/16, and of a motion (MOT-8); either may be none.
+Points added(const Points &posed, const Points &swayed) {
+    Points out(std::max(posed.size(), swayed.size()));
+    for (size_t i = 0; i < posed.size(); i++) out[i] = 64 * posed[i];
+    for (size_t i = 0; i < swayed.size(); i++) out[i] += swayed[i];
     return out;
 }
 
@@ -62,8 +54,8 @@ void Painter::Positions::add(double at, int count) {
 
 Painter::Painter(Canvas &c, int n, Budget &budget)
     : canvas(c), number(n), layr(c.image.file->layers[n]), texr(c.image.file->textures[c.image.file->source(n)]),
-      pose(c.image.file->pose(n)), moves(added(found(c.image.moved, n), found(c.sway, n))),
-      chart(pose, moves, found(c.image.places, n) ? *found(c.image.places, n) : Points(), c.image.mesh(n),
+      pose(c.image.file->pose(n)), moves(added(c.image.moved[n], c.sway[n])),
+      chart(pose, moves, c.image.places[n], c.image.mesh(n),
             layr.sampling == BOTH || layr.sampling == LOCAL) {
     const View &view = c.request.view;
     const Outline now = outline({c.image.boundaries[n], layr.unit}, c.image.file->head, pose, moves, c.image.mesh(n), budget);

@@ -13,7 +13,7 @@ struct Canvas {
     Image &image;
     const Request &request;
     Scene scene;
-    std::map<int, Points> sway;  // by layer, as Motion::at gives it
+    std::vector<Points> sway;   // by layer, as Motion::at gives it
     std::vector<uint8_t> seen;   // by layer: whether what hides samples of it hides what they would show, too
     Mutex decoding;              // of textures
 };

@@ -10,11 +10,11 @@
 namespace pxi {
 
 #ifdef PXI_NO_THREADS
-void parallel(int, int64_t count, const std::function<void(int64_t)> &work) {
+void parallel(int, int64_t count, Call<void(int64_t)> work) {
     for (int64_t i = 0; i < count; i++) work(i);
 }
 #else
-void parallel(int threads, int64_t count, const std::function<void(int64_t)> &work) {
+void parallel(int threads, int64_t count, Call<void(int64_t)> work) {
     std::atomic<int64_t> next{0};
     std::exception_ptr failed;
     Mutex mutex;

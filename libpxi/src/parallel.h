@@ -1,10 +1,11 @@
 // Work on several threads, where there are any: WebAssembly is compiled without (PXI_NO_THREADS).
 #pragma once
 
-#include <functional>
+#include <cstdint>
+
+#include "call.h"
 
 #ifdef PXI_NO_THREADS
-#define PXI_THREAD_LOCAL
 namespace pxi {
 struct Mutex {};
 struct Lock {
@@ -13,7 +14,6 @@ struct Lock {
 }  // namespace pxi
 #else
 #include <mutex>
-#define PXI_THREAD_LOCAL thread_local
 namespace pxi {
 typedef std::mutex Mutex;
 typedef std::lock_guard<std::mutex> Lock;
@@ -23,6 +23,6 @@ typedef std::lock_guard<std::mutex> Lock;
 namespace pxi {
 
 // Calls work(0) .. work(count - 1), on up to so many threads at once. The first failure ends it.
-void parallel(int threads, int64_t count, const std::function<void(int64_t)> &work);
+void parallel(int threads, int64_t count, Call<void(int64_t)> work);
 
 }  // namespace pxi

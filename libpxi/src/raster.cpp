@@ -44,11 +44,10 @@ Raster::Planes Raster::finer(int level, const Inputs &from, Window window, Windo
     Planes out(new float[3 * under->shape().size()]);
     for (int k = 0; k < 9; k++) gain[k] = (float)std::exp((double)(w.gain[k] + w.gain_by_step[k] * t));
     for (size_t i = 0; i < bias.size(); i++) bias[i] += w.first_by_step[i] * t;
-    const Listening listening(watch);
     const loops::Synthesis task = {w.linear.data(), w.first.data(), bias.data(), w.second.data(),
                                    w.second_bias.data(), w.third.data(), w.third_bias.data(), gain.data(),
                                    weights.hidden, above.rows(), above.columns(), under->rows(), under->columns(),
-                                   planes, high.data(), out.get(), listening.function()};
+                                   planes, high.data(), out.get(), watch.function, watch.user};
     check_core(core().pyramid_synthesis(&task), plan.at);
     return out;
 }
@@ -110,18 +109,49 @@ std::vector<float> Raster::matrix(int level) const {
 // Samples of a window, whose planes begin at `planes`, in rows of `stride` numbers.
 void Raster::colour(const std::vector<float> &matrix, const float *planes, int64_t stride, float *out, Shape shape,
                     Window at) const {
-    const int components = plan.components;
-    std::vector<float> row(3 * (size_t)at.columns());
+    std::vector<float> row(plan.components == 1 ? 3 * (size_t)at.columns() : 0);  // whose mean is grey
     for (int y = at.top; y < at.bottom; y++, planes += stride) {
+        float *to = out + ((int64_t)y * shape.columns + at.left) * plan.components;
+        if (row.empty()) {
+            core().shown(planes, matrix.data(), at.columns(), to);
+            continue;
+        }
         core().coloured(planes, matrix.data(), at.columns(), row.data());
-        float *to = out + ((int64_t)y * shape.columns + at.left) * components;
-        if (components == 3)
-            for (size_t i = 0; i < row.size(); i++) to[i] = std::clamp(row[i] / 255, 0.f, 1.f);
-        else
-            for (int x = 0; x < at.columns(); x++)
-                to[x] = std::clamp((row[3 * x] + row[3 * x + 1] + row[3 * x + 2]) / 3 / 255, 0.f, 1.f);
+        for (int x = 0; x < at.columns(); x++)
+            to[x] = std::clamp((row[3 * x] + row[3 * x + 1] + row[3 * x + 2]) / 3 / 255, 0.f, 1.f);
     }
 }
+
+// Makes a strip of samples of the whole raster from what the level above gives.
+void Raster::draw(const std::vector<float> &weights, const Inputs &from, Window strip) {
+    const Shape wanted = shape(0);
+    Window under;
+    const Planes found = finer(0, from, strip, &under);
+    const Window at = strip.inside(under);
+    const int64_t stride = 3 * (int64_t)under.columns();
+    colour(weights, found.get() + at.top * stride + 3 * at.left, stride, coloured[0].planes.data(), wanted, strip);
+}
+
+#ifndef PXI_NO_THREADS
+// Makes a part of the raster while its latents are decoded.
+void Raster::flow(const std::vector<float> &weights, Window part) {
+    const Shape above = grid.at(1);
+    const Window under = part.halved().grown(AROUND, above);
+    latents.prepare(1);
+    low(grid.levels, {});
+    Arrival planes(above, watch), high(above, watch);
+    const float *lows = nullptr;
+    const int count = (part.rows() + STRIP_MIN - 1) / STRIP_MIN;
+    parallel(watch.threads, 2 + count, [&](int64_t k) {
+        if (k == 0) return high.during([&] { latents.read_into(1, high); });
+        if (k == 1) return planes.during([&] { lows = low(1, under); });
+        const int top = part.top + (int)(k - 2) * STRIP_MIN;
+        const Window strip = {top, std::min(top + STRIP_MIN, part.bottom), part.left, part.right};
+        if (!planes.wait(above.rows) || !high.wait(strip.halved().grown(AROUND, above).bottom)) return;
+        draw(weights, {high.latents(), lows}, strip);
+    });
+}
+#endif
 
 const float *Raster::samples(int level, Window window) {
     const Shape wanted = shape(level);
@@ -129,15 +159,18 @@ const float *Raster::samples(int level, Window window) {
     if (!own.planes) own.planes.make(wanted.size() * plan.components), own.made = Made(wanted);
     const std::vector<float> weights = matrix(level);
     for (const Window &part : own.made.lacking(window)) {
-        const Inputs from = level ? Inputs{nullptr, low(level, part)} : inputs(0, part);
-        strips(part, [&](Window strip) {
-            Planes found;
-            Window under = Window::whole(wanted), at = strip;
-            if (level == 0) found = finer(0, from, strip, &under), at = strip.inside(under);
-            const int64_t stride = 3 * (int64_t)under.columns();
-            const float *planes = (level ? from.low : found.get()) + at.top * stride + 3 * at.left;
-            colour(weights, planes, stride, own.planes.data(), wanted, strip);
-        });
+        if (level) {
+            const float *planes = low(level, part);
+            const int64_t stride = 3 * (int64_t)wanted.columns;
+            colour(weights, planes + part.top * stride + 3 * part.left, stride, own.planes.data(), wanted, part);
+#ifndef PXI_NO_THREADS
+        } else if (watch.threads > 1 && latents.flows(1)) {
+            flow(weights, part);
+#endif
+        } else {
+            const Inputs from = inputs(0, part);
+            strips(part, [&](Window strip) { draw(weights, from, strip); });
+        }
         own.made.add(part);
     }
     if (level == 0 && own.made.whole()) latents.forget();

@@ -15,8 +15,8 @@ class Raster {
         Zeros<float> planes;  // [h][w][3]
         Made made;
     };
-    std::map<int, Level> lows;       // planes above a level
-    std::map<int, Level> coloured;   // samples [h][w][components] without so many levels
+    ByLevel<Level> lows;      // planes above a level
+    ByLevel<Level> coloured;  // samples [h][w][components] without so many levels
 
     // Planes of a level [9][h][w] and [h][w][3], which give the next finer planes.
     struct Inputs {
@@ -31,6 +31,8 @@ class Raster {
     std::vector<float> matrix(int level) const;
     void colour(const std::vector<float> &matrix, const float *planes, int64_t stride, float *out, Shape shape,
                 Window at) const;
+    void draw(const std::vector<float> &weights, const Inputs &from, Window strip);
+    void flow(const std::vector<float> &weights, Window part);
 
   public:
     Raster(const Plan &plan, const Weights &weights, const Watch &watch);

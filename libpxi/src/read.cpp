@@ -11,48 +11,31 @@ namespace pxi {
 static const int MAPS_UNTIL = 3;  // the last version whose payloads may be maps (CON-17)
 static const int64_t K16 = 1 << 16, M16 = 1 << 24, MOST = ((int64_t)1 << 31) - 1, FAR = ((int64_t)1 << 33) - 1;
 
-template <size_t N> static std::array<int, N> fixed(const std::vector<int> &found) {
-    std::array<int, N> out;
-    std::copy_n(found.begin(), N, out.begin());
-    return out;
-}
-template <size_t N> static std::array<int64_t, N> fixed(const std::vector<int64_t> &found) {
-    std::array<int64_t, N> out;
-    std::copy_n(found.begin(), N, out.begin());
-    return out;
-}
-
-static Head head_of(Values &v) {
-    Head h;
-    const auto size = v.integers("size", 1, M16, 2);
+static void read_head(Values &v, Head &h) {
+    int size[2];
+    v.integers("size", 1, M16, size, 2);
     h.width = size[0], h.height = size[1];
     h.channels = (int)v.integer("channels", 3, 4);
     h.opaque = v.integer("opaque", 0, 1);
     h.depth = (int)v.integer("depth", 8, 16);
     h.layers = (int)v.integer("layers", 1, K16);
     h.networks = (int)v.integer("networks", 0, K16);
-    return h;
 }
 
-static Layr layer_of(Values &v, Place at) {
-    Layr l;
-    l.at = at;
+static void read_layer(Values &v, Layr &l) {
     l.name = v.text("name", 1, 255);
-    l.box = fixed<4>(v.integers("box", -M16, M16, 4));
+    v.integers("box", -M16, M16, l.box.data(), 4);
     l.sampling = (int)v.integer("sampling", 0, 255);
     l.unit = (int)v.integer("unit", 0, 6);
     l.segments = v.integers("segments", 1, M16);
     l.classes = v.binary("classes");
     l.deltas = v.binary("deltas");
-    return l;
 }
 
-static Mesh mesh_of(Values &v, Place at) {
-    Mesh m;
-    m.at = at;
+static void read_mesh(Values &v, Mesh &m) {
     m.layer = (int)v.integer("layer", 0, K16);
-    m.origin = fixed<2>(v.integers("origin", -M16, M16, 2));
-    m.step = fixed<2>(v.integers("step", 1, M16, 2));
+    v.integers("origin", -M16, M16, m.origin.data(), 2);
+    v.integers("step", 1, M16, m.step.data(), 2);
     m.vertices = (int)v.integer("vertices", 3, K16);
     m.gates = (int)v.integer("gates", 3, 1 << 20);
     m.symbols = v.binary("symbols");
@@ -61,15 +44,12 @@ static Mesh mesh_of(Values &v, Place at) {
     m.deltas = v.binary("deltas");
     m.levels = (int)v.integer("levels", 0, 4);
     m.splits = v.binary("splits");
-    return m;
 }
 
-static Pose pose_of(Values &v, Place at) {
-    Pose p;
-    p.at = at;
+static void read_pose(Values &v, Pose &p) {
     p.layer = (int)v.integer("layer", 0, K16);
-    p.matrix = fixed<4>(v.wide("matrix", -MOST, MOST, 4));
-    p.shift = fixed<2>(v.wide("shift", -FAR, FAR, 2));
+    v.wide("matrix", -MOST, MOST, p.matrix.data(), 4);
+    v.wide("shift", -FAR, FAR, p.shift.data(), 2);
     p.opacity = (int)v.integer("opacity", 0, 65535);
     p.hidden = v.integer("hidden", 0, 1);
     p.colour = v.integers("colour", -(1 << 20), 1 << 20);
@@ -77,12 +57,9 @@ static Pose pose_of(Values &v, Place at) {
     p.node_deltas = v.binary("node_deltas");
     p.place_classes = v.binary("place_classes");
     p.place_deltas = v.binary("place_deltas");
-    return p;
 }
 
-static Netw network_of(Values &v, Place at) {
-    Netw n;
-    n.at = at;
+static void read_network(Values &v, Netw &n) {
     n.dim = (int)v.integer("dim", 1, 64);
     n.octaves = (int)v.integer("octaves", 0, 12);
     n.hidden = (int)v.integer("hidden", 1, 1024);
@@ -92,14 +69,12 @@ static Netw network_of(Values &v, Place at) {
     n.steps = v.binary("steps");
     n.biases = v.binary("biases");
     n.weights = v.binary("weights");
-    return n;
 }
 
-static Plan plan_of(Values &v, Place at, int minor) {
-    Plan p;
-    p.at = at;
+static void read_plan(Values &v, Plan &p, int minor) {
     p.model = (int)v.integer("model", 0, 65535);
-    const auto size = v.integers("size", 1, M16, 2);
+    int size[2];
+    v.integers("size", 1, M16, size, 2);
     p.width = size[0], p.height = size[1];
     p.components = (int)v.integer("components", 1, 3);
     p.step = (int)v.integer("step", 0, 640);
@@ -113,13 +88,12 @@ static Plan plan_of(Values &v, Place at, int minor) {
     if (minor >= 12) p.details = v.integers("details", 0, 255);
     p.escapes = v.binary("escapes");
     p.data = v.binary("data");
-    return p;
 }
 
-static void view_of(Values &v, Texr &t, int minor) {
+static void read_view(Values &v, Texr &t, int minor) {
     t.planes = (int)v.integer("planes", 0, K16);
     t.alpha = (int)v.integer("alpha", 0, K16);
-    t.part = fixed<4>(v.integers("part", 0, M16, 4));
+    v.integers("part", 0, M16, t.part.data(), 4);
     t.cell = (int)v.integer("cell", 0, 6);
     t.mask = v.binary("mask");
     t.cuts = v.integers("cuts", 0, K16);
@@ -134,29 +108,25 @@ static void view_of(Values &v, Texr &t, int minor) {
     if (minor >= 12) t.matte = (int)v.integer("matte", 0, K16);
 }
 
-static Texr texture_of(Values &v, Place at, int minor) {
-    Texr t;
-    t.at = at;
+static void read_texture(Values &v, Texr &t, int minor) {
     const int64_t coder = v.integer("coder", 0, 255);
-    supported(coder <= PYRAMID, "CHK-13", "the coder of a texture is not known", at);
+    supported(coder <= PYRAMID, "CHK-13", "the coder of a texture is not known", t.at);
     if (minor > MAPS_UNTIL) v.refuse_map();
     t.coder = (Coder)coder;
     if (t.coder == SHARED) t.texture = (int)v.integer("texture", 0, K16);
-    if (t.coder == PYRAMID) view_of(v, t, minor);
-    if (t.coder != IMPLICIT) return t;
+    if (t.coder == PYRAMID) read_view(v, t, minor);
+    if (t.coder != IMPLICIT) return;
     t.network = (int)v.integer("network", 0, K16);
-    const auto grid = v.integers("grid", 2, M16, 2);
+    int grid[2];
+    v.integers("grid", 2, M16, grid, 2);
     t.columns = grid[0], t.rows = grid[1];
     t.bits = (int)v.integer("bits", 2, 8);
     t.steps = v.binary("steps");
     t.stored = v.binary("stored");
     t.codes = v.binary("codes");
-    return t;
 }
 
-static Motn motion_of(Values &v, Place at) {
-    Motn m;
-    m.at = at;
+static void read_motion(Values &v, Motn &m) {
     m.duration = (int)v.integer("duration", 1, 3600000);
     m.fps = (int)v.integer("fps", 1, 240);
     m.loop = (int)v.integer("loop", 0, 1);
@@ -171,13 +141,19 @@ static Motn motion_of(Values &v, Place at) {
     m.shape_deltas = v.binary("shape_deltas");
     m.size = (int)v.integer("size", 0, MOST);
     m.script = v.binary("script");
-    return m;
 }
 
-// Takes a value of a chunk that comes once a layer, in the order of these (CHK-9, CHK-10).
-template <class Item> static void put(std::map<int, Item> &to, Item item, const char *rule) {
-    need(to.empty() || to.rbegin()->first < item.layer, rule, "layers do not ascend", item.at);
-    to.emplace(item.layer, std::move(item));
+// What the next chunk of a kind becomes.
+template <class Item> static Item &next(std::vector<Item> &all, const Place &at) {
+    all.emplace_back();
+    all.back().at = at;
+    return all.back();
+}
+
+// Refuses layers that do not ascend, of chunks that come once a layer (CHK-9, CHK-10).
+template <class Item> static void check_order(const std::vector<Item> &all, const char *rule) {
+    const size_t count = all.size();
+    need(count < 2 || all[count - 2].layer < all.back().layer, rule, "layers do not ascend", all.back().at);
 }
 
 // A chunk of metadata. Groups are checked for nobody here, and a history is not looked into (CON-9).
@@ -187,10 +163,10 @@ static void read_metadata(File &f, const Chunk &chunk, Values v, Budget &budget)
         f.primaries = (int)v.integer("primaries", 1, 255);
         f.transfer = (int)v.integer("transfer", 1, 255);
     } else if (is("iNFO")) {
-        f.encoder = v.text("encoder", 0, 255);
-        f.settings = v.text("settings", 0, K16);
-        const auto areas = v.wide("areas", 0, (int64_t)1 << 48);
-        need(areas.empty() || areas.size() == f.layers.size(), "CHK-17", "areas are not one a layer",
+        v.text("encoder", 0, 255);
+        v.text("settings", 0, K16);
+        const size_t areas = v.areas("areas", (int64_t)1 << 48);
+        need(!areas || areas == f.layers.size(), "CHK-17", "areas are not one a layer",
              chunk.at);
     } else {
         const int64_t size = v.integer("size", 1, MOST);
@@ -203,30 +179,33 @@ static void read_metadata(File &f, const Chunk &chunk, Values v, Budget &budget)
 
 static void read_chunk(File &f, const Chunk &chunk, Budget &budget, bool blocks) {
     const auto is = [&](const char *type) { return !std::strcmp(chunk.at.chunk, type); };
-    const Place at = chunk.at;
+    const Place &at = chunk.at;
     if (is("uNDO") || is("tREE")) return;
     const bool metadata = is("iCCp") || is("eXIf") || is("xMPd") || is("cICp") || is("iNFO");
     if (metadata && !blocks) return;
     Values v(chunk.payload, at, f.minor <= MAPS_UNTIL || is("TEXR"));  // whose coder comes first (CHK-13)
     if (metadata) return read_metadata(f, chunk, v, budget);
     if (is("HEAD")) {
-        f.head = head_of(v);
+        read_head(v, f.head);
     } else if (is("LAYR")) {
         budget.check(LAYERS, (int64_t)f.layers.size() + 1);
-        f.layers.push_back(layer_of(v, at));
+        read_layer(v, next(f.layers, at));
     } else if (is("MESH")) {
-        put(f.meshes, mesh_of(v, at), "CHK-9");
+        read_mesh(v, next(f.meshes, at));
+        check_order(f.meshes, "CHK-9");
     } else if (is("POSE")) {
-        put(f.poses, pose_of(v, at), "CHK-10");
+        read_pose(v, next(f.poses, at));
+        check_order(f.poses, "CHK-10");
     } else if (is("NETW")) {
         budget.check(NETWORKS, (int64_t)f.networks.size() + 1);
-        f.networks.push_back(network_of(v, at));
+        read_network(v, next(f.networks, at));
     } else if (is("TEXR")) {
-        f.textures.push_back(texture_of(v, at, f.minor));
+        read_texture(v, next(f.textures, at), f.minor);
     } else if (is("PLAN")) {
-        f.plans.push_back(plan_of(v, at, f.minor));
+        read_plan(v, next(f.plans, at), f.minor);
     } else {
-        f.motion = motion_of(v, at);
+        f.motion.at = at;
+        read_motion(v, f.motion);
         f.moves = true;
     }
     v.end();

@@ -24,6 +24,6 @@ void decode_codes(Texr &texture, int dim);
 void decode_cells(Texr &view);
 
 // The content of one zstd frame (CHK-16), which has `size` bytes.
-std::vector<uint8_t> decompressed(Bytes frame, int64_t size, Place at, Budget &budget);
+std::vector<uint8_t> decompressed(Bytes frame, int64_t size, const Place &at, Budget &budget);
 
 }  // namespace pxi

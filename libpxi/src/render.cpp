@@ -15,17 +15,17 @@ constexpr int64_t TILE_SAMPLES = 1 << 16;  // drawn at a time: bounds memory, an
 
 // Hears of the work of all threads, one at a time.
 class Progress {
-    const Told &told;
+    const Told told;
     Mutex mutex;
     double done = 0;
     static constexpr double SHARE = .75;  // of decoding
 
   public:
-    explicit Progress(const Told &t) : told(t) {}
+    explicit Progress(Told t) : told(t) {}
     void at(double share) {
         const Lock lock(mutex);
         done = std::max(done, share);
-        if (told) told(std::min(done, 1.));
+        told(std::min(done, 1.));
     }
     void drawn(int64_t pixels, int64_t all, double before) { at(before + (1 - before) * pixels / (double)all); }
     static int decoding(void *self, int part, int all) {
@@ -102,7 +102,7 @@ class Tile {
     }
 };
 
-void compose(Canvas &canvas, std::vector<std::unique_ptr<Painter>> &painters, const Put &put, Progress &progress,
+void compose(Canvas &canvas, std::vector<std::unique_ptr<Painter>> &painters, const Pixels &to, Progress &progress,
              Budget &budget) {
     const View &view = canvas.request.view;
     const int64_t pixel = (int64_t)view.sx * view.sy;
@@ -127,7 +127,7 @@ void compose(Canvas &canvas, std::vector<std::unique_ptr<Painter>> &painters, co
         if (!tile) tile = std::make_unique<Tile>();
         tile->draw(painters, box, own);
         tile->average(box, view.sx, view.sy);
-        put({column, row, w, h}, tile->result.data(), 4);
+        to.put({column, row, w, h}, tile->result.data(), 4);
         int64_t done;
         {
             const Lock lock(mutex);
@@ -143,19 +143,21 @@ void compose(Canvas &canvas, std::vector<std::unique_ptr<Painter>> &painters, co
 
 }  // namespace
 
-void render(Image &image, const Request &request, const Put &put, const Told &told) {
+void render(Image &image, const Request &request, const Pixels &to, Told told) {
     const View &view = request.view;
     Budget budget(request.limits);
     budget.spend(OUTPUT_PIXELS, (int64_t)view.width * view.height);
-    const __int128 cost = (__int128)request.drawn.size() * view.columns() * view.rows() * SAMPLE_COST;
-    budget.spend(MULTIPLY_ADDS, (int64_t)std::min<__int128>(cost, INT64_MAX));
+    // In double precision, which does not overflow; what is not exact is beyond all limits.
+    const double cost = (double)request.drawn.size() * (double)view.columns() * (double)view.rows() * SAMPLE_COST;
+    budget.spend(MULTIPLY_ADDS, (int64_t)std::min(cost, 0x1p62));
     Progress progress(told);
     const Heard heard(*image.textures, progress, request.threads);
     Canvas canvas{image, request, {}, {}, {}, {}};
     const size_t count = image.file->layers.size();
     canvas.scene = {std::vector<uint8_t>(count), request.moving}, canvas.seen.resize(count);
     for (const int n : request.drawn) canvas.scene.drawn[n] = 1;
-    if (request.moving) canvas.sway = image.motion->at(request.time);
+    canvas.sway.resize(count);
+    if (request.moving) canvas.sway = image.motion->at(request.time, count);
     progress.at(0);
     bool all_solid = true, at_rest = true;
     for (const int n : request.drawn) {
@@ -165,11 +167,11 @@ void render(Image &image, const Request &request, const Put &put, const Told &to
         canvas.seen[n] = in_place && texr.mask.empty() && !texr.matte;
     }
     if (!all_solid) std::fill(canvas.seen.begin(), canvas.seen.end(), 0);
-    else if (at_rest && thumbnail(image, request, put, [&](double share) { progress.at(share); })) return;
+    else if (at_rest && thumbnail(image, request, to, [&](double share) { progress.at(share); })) return;
     std::vector<std::unique_ptr<Painter>> painters;  // front to back
     for (auto n = request.drawn.rbegin(); n != request.drawn.rend(); n++)
         painters.push_back(std::make_unique<Painter>(canvas, *n, budget));
-    compose(canvas, painters, put, progress, budget);
+    compose(canvas, painters, to, progress, budget);
 }
 
 }  // namespace pxi

@@ -7,7 +7,7 @@ namespace pxi {
 
 namespace {
 
-constexpr int64_t SIDE_MAX = 1 << 21;  // output columns or rows
+constexpr int64_t SIDE_MAX = 2097152;  // output columns or rows
 constexpr uint32_t THREADS_MAX = 64;
 
 // The integer nearest to a b / c, ties to even, but at least 1.
@@ -45,7 +45,7 @@ View view_of(const Head &head, const pxi_request &asked) {
         size[0] = ratio(w, asked.height, h);
     }
     if (std::max(size[0], size[1]) > SIDE_MAX)
-        fail(Kind::LIMIT, "", "the output would have more than " + std::to_string(SIDE_MAX) + " pixels a side");
+        fail(Kind::LIMIT, "", "the output would have more than 2097152 pixels a side");
     return View(region, (int)size[0], (int)size[1]);
 }
 

@@ -1,7 +1,5 @@
 #include "texture.h"
 
-#include <map>
-
 #include "hidden.h"
 #include "raster.h"
 
@@ -18,8 +16,8 @@ struct Textures::Inner {
     const std::vector<Boundary> &boundaries;
     const Limits limits;
     Models models;
-    std::map<int, std::shared_ptr<Raster>> rasters;  // by plan
-    std::map<int, std::shared_ptr<Shown>> views;      // by layer
+    std::vector<std::shared_ptr<Raster>> rasters;  // by plan
+    std::vector<std::shared_ptr<Shown>> views;      // by layer
 
     Raster &raster(int plan, const Watch &watch) {
         std::shared_ptr<Raster> &found = rasters[plan];
@@ -106,7 +104,9 @@ std::shared_ptr<Shown> Textures::Inner::made(int n, const Scene &scene, const Wa
 }
 
 Textures::Textures(const File &file, const std::vector<Boundary> &boundaries, const Limits &limits, FindModel models)
-    : inner(new Inner{file, boundaries, limits, Models(std::move(models)), {}, {}}) {}
+    : inner(new Inner{file, boundaries, limits, Models(models), {}, {}}) {
+    forget();
+}
 Textures::~Textures() = default;
 
 void Textures::shape(int plan, int level, int *rows, int *columns) const {
@@ -140,6 +140,13 @@ Samples Textures::view(int n, const Scene &scene, Window window) {
     return {last->samples.data(), h, w, last->channels, last};
 }
 
+size_t Textures::latent_count(int plan) const {
+    const Grid grid(inner->file.plans[plan]);
+    int64_t count = 3 * grid.at(grid.levels).size();
+    for (int level = grid.levels; level > 0; level--) count += 9 * grid.at(level).size();
+    return (size_t)count;
+}
+
 std::vector<int32_t> Textures::latents(int plan) {
     const Plan &p = inner->file.plans[plan];
     Latents latents(p, inner->models.of(p.model), watch);
@@ -154,6 +161,9 @@ std::vector<int32_t> Textures::latents(int plan) {
     return out;
 }
 
-void Textures::forget() { inner->rasters.clear(), inner->views.clear(); }
+void Textures::forget() {
+    inner->rasters.assign(inner->file.plans.size(), {});
+    inner->views.assign(inner->file.layers.size(), {});
+}
 
 }  // namespace pxi

@@ -54,6 +54,7 @@ class Textures {
 
     // All latents of a PLAN in the order of PYR-29: lowest planes, then levels from the coarsest on.
     std::vector<int32_t> latents(int plan);
+    size_t latent_count(int plan) const;
 
     // Forgets what was decoded.
     void forget();

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "parallel.h"
+
 namespace pxi {
 
 namespace {
@@ -15,7 +17,7 @@ constexpr int STRIP = 64;
 bool plain(const Image &image, int n) {
     const File &file = *image.file;
     const Texr &texr = file.textures[file.source(n)];
-    return texr.coder == PYRAMID && !texr.alpha && texr.mask.empty() && !file.poses.contains(n);
+    return texr.coder == PYRAMID && !texr.alpha && texr.mask.empty() && !of_layer(file.poses, n);
 }
 
 // Numbers of the planes that all layers show, each sample on its pixel; -1 if there are none.
@@ -82,13 +84,35 @@ struct Taps {
     int high() const { return std::min(first.back() + taps, size); }
 };
 
+// Puts samples as they are, pixel by pixel.
+void copy(Image &image, const Request &request, int number, const Pixels &pixels) {
+    const std::array<int, 4> &region = request.view.region;
+    const int x = region[0], y = region[1], w = region[2], h = region[3];
+    const Samples samples = image.textures->raster(number, 0, {y, y + h, x, x + w});
+    const int C = samples.channels;
+    parallel(request.threads, (h + STRIP - 1) / STRIP, [&](int64_t k) {
+        std::vector<float> grey(C == 1 ? 3 * (size_t)w : 0);
+        for (int row = (int)k * STRIP; row < std::min((int)(k + 1) * STRIP, h); row++) {
+            const float *from = samples.at + ((int64_t)(y + row) * samples.columns + x) * C;
+            for (size_t i = 0; i < grey.size(); i++) grey[i] = from[i / 3];
+            pixels.put({0, row, w, 1}, grey.empty() ? from : grey.data(), 3);
+        }
+    });
+}
+
 }  // namespace
 
-bool thumbnail(Image &image, const Request &request, const Put &put, const Told &told) {
+bool thumbnail(Image &image, const Request &request, const Pixels &pixels, Told told) {
     const View &view = request.view;
-    if (view.width >= view.region[2] || view.height >= view.region[3]) return false;
+    const bool same = view.width == view.region[2] && view.height == view.region[3];
+    if (!same && (view.width >= view.region[2] || view.height >= view.region[3])) return false;
     const int number = raster_of(image, request);
     if (number < 0) return false;
+    if (same) {
+        copy(image, request, number, pixels);
+        told(1);
+        return true;
+    }
     const double across = view.region[2] / (double)view.width, down = view.region[3] / (double)view.height;
     const int level = spare(image.file->plans[number], std::min(across, down));
     int rows, columns;
@@ -118,7 +142,7 @@ bool thumbnail(Image &image, const Request &request, const Put &put, const Told 
                 }
             }
         }
-        put({0, top, view.width, height}, out.data(), 3);
+        pixels.put({0, top, view.width, height}, out.data(), 3);
         told(1);
     }
     return true;

@@ -8,7 +8,7 @@ namespace pxi {
 
 static const size_t ITEMS_MAX = 1 << 20;
 
-Values::Values(Bytes payload, Place at, bool maps) : bytes(payload), at(at) {
+Values::Values(Bytes payload, const Place &at, bool maps) : bytes(payload), at(at) {
     const int first = skip(1)[0];
     need(first >= 0x80 && first <= 0x9f, "CON-14", "the payload is no array of up to 15 values", at);
     map = first < 0x90, count = first & 15;
@@ -74,14 +74,12 @@ void Values::key(const char *name) {
 }
 
 void Values::within(bool ok, const char *name) const {
-    if (!ok) fail(Kind::INVALID, "CHK-1", std::string(name) + " is out of its range", at);
+    if (!ok) fail(Kind::INVALID, "CHK-1", (std::string(name) + " is out of its range").c_str(), at);
 }
 
 int64_t Values::integer(const char *name, int64_t low, int64_t high) {
     key(name);
-    const int64_t value = any_integer();
-    within(value >= low && value <= high, name);
-    return value;
+    return item(name, low, high);
 }
 
 size_t Values::items() {
@@ -91,20 +89,36 @@ size_t Values::items() {
     return size;
 }
 
-std::vector<int64_t> Values::wide(const char *name, int64_t low, int64_t high, int exactly) {
+int64_t Values::item(const char *name, int64_t low, int64_t high) {
+    const int64_t value = any_integer();
+    within(value >= low && value <= high, name);
+    return value;
+}
+
+std::vector<int> Values::integers(const char *name, int64_t low, int64_t high) {
     key(name);
-    std::vector<int64_t> out(items());
-    for (int64_t &value : out) {
-        value = any_integer();
-        within(value >= low && value <= high, name);
-    }
-    within(exactly < 0 || out.size() == (size_t)exactly, name);
+    std::vector<int> out(items());
+    for (int &value : out) value = (int)item(name, low, high);
     return out;
 }
 
-std::vector<int> Values::integers(const char *name, int64_t low, int64_t high, int exactly) {
-    const std::vector<int64_t> found = wide(name, low, high, exactly);
-    return std::vector<int>(found.begin(), found.end());
+void Values::integers(const char *name, int64_t low, int64_t high, int *to, size_t exactly) {
+    key(name);
+    within(items() == exactly, name);
+    for (size_t i = 0; i < exactly; i++) to[i] = (int)item(name, low, high);
+}
+
+void Values::wide(const char *name, int64_t low, int64_t high, int64_t *to, size_t exactly) {
+    key(name);
+    within(items() == exactly, name);
+    for (size_t i = 0; i < exactly; i++) to[i] = item(name, low, high);
+}
+
+size_t Values::areas(const char *name, int64_t high) {
+    key(name);
+    const size_t count = items();
+    for (size_t i = 0; i < count; i++) item(name, 0, high);
+    return count;
 }
 
 Bytes Values::binary(const char *name) {
@@ -135,24 +149,13 @@ int64_t characters(Bytes text) {
     return count;
 }
 
-std::string Values::any_text(const char *name, int low, int high) {
+std::string Values::text(const char *name, int low, int high) {
+    key(name);
     const Bytes found = skip(length(skip(1)[0], 0xa0, 32, 0xd9, 0xda));
     const int64_t count = characters(found);
     need(count >= 0, "CON-16", "a string is not UTF-8", at);
     within(count >= low && count <= high, name);
     return std::string(found.begin(), found.end());
-}
-
-std::string Values::text(const char *name, int low, int high) {
-    key(name);
-    return any_text(name, low, high);
-}
-
-std::vector<std::string> Values::texts(const char *name, int low, int high) {
-    key(name);
-    std::vector<std::string> out(items());
-    for (std::string &text : out) text = any_text(name, low, high);
-    return out;
 }
 
 void Values::end() {

@@ -16,15 +16,4 @@ struct Watch {
     }
 };
 
-// Lets the loops of the core, whose callbacks know no user, ask a watch of this thread while it lives.
-class Listening {
-    const Watch *before;
-
-  public:
-    explicit Listening(const Watch &watch);
-    ~Listening();
-    Listening(const Listening &) = delete;
-    int (*function() const)(int done, int all);  // null if nobody asks
-};
-
 }  // namespace pxi

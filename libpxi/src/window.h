@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <cstdlib>
 #include <memory>
@@ -10,6 +11,9 @@
 #include "errors.h"
 
 namespace pxi {
+
+// Of each level of a pyramid: the samples, up to 8 levels, and what is above the coarsest.
+template <class Item> using ByLevel = std::array<Item, 10>;
 
 struct Shape {
     int rows, columns;

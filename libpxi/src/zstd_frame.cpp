@@ -12,7 +12,7 @@ namespace pxi {
 static const uint8_t MAGIC[] = {0x28, 0xb5, 0x2f, 0xfd};  // other frames are skippable
 static const int WINDOW_LOG_MAX = 27;
 
-std::vector<uint8_t> decompressed(Bytes frame, int64_t size, Place at, Budget &budget) {
+std::vector<uint8_t> decompressed(Bytes frame, int64_t size, const Place &at, Budget &budget) {
     budget.spend(METADATA_BYTES, size);
     need(frame.size() >= 4 && !std::memcmp(frame.data(), MAGIC, 4), "CHK-16", "metadata is not a zstd frame", at);
     const std::unique_ptr<ZSTD_DCtx, size_t (*)(ZSTD_DCtx *)> context(ZSTD_createDCtx(), ZSTD_freeDCtx);

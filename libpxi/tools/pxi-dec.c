@@ -8,17 +8,19 @@
 
 #include "png.h"
 #include "pxi.h"
+#include "sha256.h"
 
 static const char USAGE[] =
     "usage: pxi-dec IN.pxi OUT.png [--width N] [--height N] [--scale S] [--region X,Y,W,H] [--time S]\n"
     "               [--layer NAME|INDEX].. [--no-background] [--bit-depth 8|16] [--threads N]\n"
-    "       pxi-dec --list IN.pxi\n";
+    "       pxi-dec --list IN.pxi\n"
+    "       pxi-dec --latents IN.pxi\n";
 
 typedef struct {
     const char *in, *out;
     const char **layers;  /* as they were asked for */
     size_t layer_count;
-    int list, bits;
+    int list, latents, bits;
     pxi_request request;
 } Command;
 
@@ -70,6 +72,8 @@ static int parse(Command *c, int count, char **words) {
             c->request.without_background = 1;
         } else if (!strcmp(word, "--list")) {
             c->list = 1;
+        } else if (!strcmp(word, "--latents")) {
+            c->latents = 1;
         } else if (strncmp(word, "--", 2)) {
             if (c->out) return wrong("a file too many", word);
             *(c->in ? &c->out : &c->in) = word;
@@ -81,7 +85,8 @@ static int parse(Command *c, int count, char **words) {
             if (problem) return *problem ? wrong(problem, value) : wrong("no such flag", word);
         }
     }
-    return c->in && c->list == !c->out ? 0 : wrong("files are missing", c->list ? "IN" : "IN and OUT");
+    const int alone = c->list || c->latents;
+    return c->in && alone == !c->out ? 0 : wrong("files are missing", alone ? "IN" : "IN and OUT");
 }
 
 static void *read_whole(const char *path, size_t *size) {
@@ -141,6 +146,30 @@ static int list(pxi_file *file, pxi_error *error) {
     return 0;
 }
 
+/* Prints the SHA-256 of all latents, as little-endian integers of 32 bits. */
+static int hash_latents(pxi_file *file, pxi_error *error) {
+    Sha256 hash;
+    char digits[65];
+    size_t count = 0;
+    int status = PXI_OK;
+    sha256_begin(&hash);
+    for (uint32_t plane = 0; pxi_latents(file, plane, NULL, &count, error) == PXI_OK; plane++) {
+        int32_t *values = malloc(count * sizeof *values);
+        status = values ? (int)pxi_latents(file, plane, values, &count, error) : PXI_MEMORY;
+        for (size_t i = 0; !status && i < count; i++) {
+            const uint32_t v = (uint32_t)values[i];
+            const uint8_t bytes[4] = {(uint8_t)v, (uint8_t)(v >> 8), (uint8_t)(v >> 16), (uint8_t)(v >> 24)};
+            sha256_add(&hash, bytes, 4);
+        }
+        free(values);
+        if (status) return status;
+    }
+    error->status = PXI_OK;  /* there are no more planes */
+    sha256_end(&hash, digits);
+    puts(digits);
+    return PXI_OK;
+}
+
 static int write_png(const char *path, const void *pixels, const pxi_output *output, int bits) {
     FILE *to = fopen(path, "wb");
     int bad = !to || png_write(to, pixels, output->width, output->height, bits, output->opaque ? 3 : 4);
@@ -178,7 +207,7 @@ static int run(Command *c, pxi_error *error) {
     }
     status = (int)pxi_open(bytes, size, NULL, &file, error);
     free(bytes);
-    if (!status) status = c->list ? list(file, error) : decode(file, c, error);
+    if (!status) status = c->list ? list(file, error) : c->latents ? hash_latents(file, error) : decode(file, c, error);
     if (error->status) fprintf(stderr, "pxi-dec: %s: %s%s%s\n", c->in, error->message, *error->rule ? ", rule " : "", error->rule);
     else if (status == PXI_MEMORY) fprintf(stderr, "pxi-dec: %s: there is not enough memory\n", c->in);
     pxi_close(file);
@@ -186,7 +215,7 @@ static int run(Command *c, pxi_error *error) {
 }
 
 int main(int count, char **words) {
-    Command c = {NULL, NULL, malloc((size_t)count * sizeof(char *)), 0, 0, 8, PXI_REQUEST_INIT};
+    Command c = {NULL, NULL, malloc((size_t)count * sizeof(char *)), 0, 0, 0, 8, PXI_REQUEST_INIT};
     pxi_error error = PXI_ERROR_INIT;
     int status = PXI_LIMIT;
     if (!c.layers) fputs("pxi-dec: there is not enough memory\n", stderr);

@@ -5,7 +5,6 @@
 // instance must not be called again: the host gives it up, with all of its memory, and makes another.
 #include <algorithm>
 #include <cstring>
-#include <map>
 #include <string>
 #include <vector>
 
@@ -26,13 +25,13 @@ IMPORTED("inflate") void pxi_inflate(const uint8_t *frame, size_t count, uint8_t
 namespace pxi {
 
 static Limits limits, limits_of_file;  // of the next call, and of the one that opened the file
-static std::map<std::string, Bytes> models;
+static std::vector<std::pair<std::string, Bytes>> models;
 static Image *image;  // is never destroyed: the instance is
 static std::vector<uint32_t> drawn;
 static bool opaque;  // the last picture
 
 // The host checks that the frame is of zstd, and has nothing after it.
-std::vector<uint8_t> decompressed(Bytes frame, int64_t size, Place at, Budget &budget) {
+std::vector<uint8_t> decompressed(Bytes frame, int64_t size, const Place &at, Budget &budget) {
     budget.spend(METADATA_BYTES, size);
     need(frame.size() >= 4, "CHK-16", "metadata is not a zstd frame", at);
     std::vector<uint8_t> out((size_t)size);
@@ -42,6 +41,12 @@ std::vector<uint8_t> decompressed(Bytes frame, int64_t size, Place at, Budget &b
 
 static int told(void *, int done, int all) {
     pxi_told(done / (double)std::max(all, 1));
+    return 0;
+}
+
+static int find(void *, const char *file, const void **bytes, size_t *count) {
+    for (const auto &[name, weights] : models)
+        if (name == file) *bytes = weights.data(), *count = weights.size();
     return 0;
 }
 
@@ -55,16 +60,11 @@ EXPORTED("limit") void limit(const char *name, double value) {
 }
 
 EXPORTED("model") void model(const char *file, const uint8_t *weights, size_t count) {
-    models[file] = {weights, count};
+    models.push_back({file, {weights, count}});
 }
 
 EXPORTED("open") void open(const uint8_t *from, size_t count) {
-    const FindModel find = [](const char *file, Bytes *found) {
-        const auto known = models.find(file);
-        if (known != models.end()) *found = known->second;
-        return known != models.end();
-    };
-    image = new Image(Bytes(from, count), limits, find, Watch{told, nullptr});
+    image = new Image(Bytes(from, count), limits, {find, nullptr}, Watch{told, nullptr});
     limits_of_file = limits;
 }
 
@@ -103,7 +103,7 @@ EXPORTED("render") void *render(uint32_t x, uint32_t y, uint32_t w, uint32_t h, 
     if (size > PTRDIFF_MAX) out_of_memory();
     void *pixels = operator new((size_t)size);
     opaque = own.opaque(*image);
-    render(*image, own, into(pixels, (size_t)stride, format, opaque), pxi_told);
+    render(*image, own, {pixels, (size_t)stride, format, opaque}, [](double share) { pxi_told(share); });
     return pixels;
 }
 

@@ -29,7 +29,10 @@ struct Level {
     const uint8_t *bands;    // [height][width], bit b set where band b is coded
     const int32_t *given;    // [9][height][width] to encode, or null to decode
     int32_t *latents;        // [9][height][width], 0
-    int (*watch)(int done, int all);  // hears of progress, and stops the work by a 1; or null
+    // Hears of progress, and stops the work by a 1; or null. Rows are looked ahead first: position (y, x) is coded
+    // when more than height + x + 3 y is done.
+    int (*watch)(void *listener, int done, int all);
+    void *listener;
 };
 
 struct Lowest {  // planes, decoded by ascending x + y
@@ -248,7 +251,7 @@ class LevelCoder {
 
     // Tells what is done, now and then; whether to stop.
     bool stopped(int done) const {
-        return s.watch && done % 16 == 0 && s.watch(done, h + w + 3 * (h - 1));
+        return s.watch && done % 16 == 0 && s.watch(s.listener, done, h + w + 3 * (h - 1));
     }
 
     // What does not depend on the level itself.

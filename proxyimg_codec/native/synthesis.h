@@ -14,7 +14,8 @@ struct Synthesis {  // of one level: weights [out][in].., as in texture/register
     const float *low;                              // [height][width][3]
     const int32_t *latents;                        // [9][height][width]
     float *out;                                    // [rows][columns][3]
-    int (*watch)(int done, int all);               // as in struct Level
+    int (*watch)(void *listener, int done, int all);  // as in struct Level
+    void *listener;
 };
 
 // What planes give is summed at every position; latents, most of which are 0, add what they give to the
@@ -180,7 +181,7 @@ class Synthesizer {
         read(0);
         for (int y = -2; y < 2; y++) read_wide(y);
         for (int y = 0; y <= h; y++) {  // the hidden units are a row ahead
-            if (s.watch && y % 8 == 0 && s.watch(y, h + 1)) return STOPPED;
+            if (s.watch && y % 8 == 0 && s.watch(s.listener, y, h + 1)) return STOPPED;
             read(y + 1);
             rows.up();
             if (y < h)

@@ -14,7 +14,7 @@ from ..native import kernel
 from .context import Ints
 from .network import Floats
 from .registered_model import Synthesis
-from .watch import WATCH, Watch
+from .watch import LISTENED, Watch
 
 ARRAYS = (
     "linear", "first", "first_bias", "second", "second_bias", "third", "third_bias", "gain",
@@ -28,7 +28,8 @@ class _Level(ct.Structure):
         *((n, ct.c_void_p) for n in ARRAYS),
         *((n, ct.c_int32) for n in ("hidden", "height", "width", "rows", "columns")),
         *((n, ct.c_void_p) for n in ("low", "latents", "out")),
-        ("watch", WATCH),
+        ("watch", LISTENED),
+        ("listener", ct.c_void_p),
     ]
 
 

@@ -132,6 +132,7 @@ ARGUMENTS = {
     "pxi_describe_layer": [POINTER, U32, POINTER, POINTER],
     "pxi_describe_metadata": [POINTER, U32, POINTER, POINTER],
     "pxi_measure": [POINTER, POINTER, POINTER, POINTER],
+    "pxi_latents": [POINTER, U32, POINTER, ct.POINTER(SIZE), POINTER],
     "pxi_render": [POINTER, POINTER, POINTER, SIZE, SIZE, POINTER],
 }
 

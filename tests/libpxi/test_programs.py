@@ -29,8 +29,9 @@ SMALL = ["canvases", "networks", "meshes", "poses", "views", "behind", "motion",
 @pytest.mark.parametrize("kind", SMALL)
 def test_pxi_dec_passes_the_conformance_suite(pxi_dec, kind, tmp_path):
     command = f"{shlex.quote(str(pxi_dec))} {{in}} {{out}} {{args}}"
-    words = [sys.executable, "-m", "conformance.runner", "--decoder", command, "--cases",
-             CASES / kind]  # fmt: skip
+    hashing = f"{shlex.quote(str(pxi_dec))} --latents {{in}}"
+    words = [sys.executable, "-m", "conformance.runner", "--decoder", command, "--latents", hashing,
+             "--cases", CASES / kind]  # fmt: skip
     assert "cases passed" in run(*words, cwd=ROOT)
 
 

@@ -3,9 +3,11 @@
 import fcntl
 import shutil
 import subprocess
+from collections.abc import Iterator
 
 import pytest
 
+from tests.support.js import Batch
 from tests.support.paths import ROOT
 
 
@@ -19,6 +21,14 @@ def lacking() -> str | None:
     if subprocess.run(words, input=header, text=True, capture_output=True).returncode:
         return "the C++ library of wasm32-wasi is not installed"
     return None
+
+
+@pytest.fixture(scope="module")
+def batch() -> Iterator[Batch]:
+    """A decoder under Node for all tests of a module."""
+    started = Batch()
+    yield started
+    started.end()
 
 
 @pytest.fixture(scope="session")

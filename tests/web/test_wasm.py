@@ -1,4 +1,4 @@
-"""libpxi as WebAssembly, with its face in JavaScript; test_js_decoder.py judges it."""
+"""libpxi as WebAssembly, with its face in JavaScript; test_wasm_suite.py judges it."""
 
 import json
 import os

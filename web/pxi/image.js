@@ -13,6 +13,14 @@ import { synthesize } from "./synthesis.js";
 import { viewOf } from "./view.js";
 import { Budget, LIMITS } from "./limits.js";
 
+/** Models by their bytes: several pictures share what was decoded of them. */
+const models = new WeakMap();
+
+function modelOf(bytes) {
+  if (!models.has(bytes)) models.set(bytes, decodeModel(bytes));
+  return models.get(bytes);
+}
+
 export class Image {
   #cache = new Map();
 
@@ -24,7 +32,7 @@ export class Image {
   static async open(bytes, loadModel, limits = {}) {
     const image = new Image(bytes, new Budget({ ...LIMITS, ...limits }));
     for (const { model } of image.plans) {
-      if (!image.models.has(model)) image.models.set(model, decodeModel(await loadModel(model)));
+      if (!image.models.has(model)) image.models.set(model, modelOf(await loadModel(model)));
     }
     return image;
   }

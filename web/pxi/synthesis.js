@@ -13,8 +13,15 @@ function wavelet(high, n) {
   return (high ? SHARP[Math.abs(n - 1)] : SMOOTH[Math.abs(n)]) ?? 0;
 }
 
-/** Weights of the linear part [12 outputs][12 planes][5][5] (PYR-32). */
+/** Weights of the linear part [12 outputs][12 planes][5][5] of networks (PYR-32), by what these add. */
+const linear = new WeakMap();
+
 function linearWeights(delta) {
+  if (!linear.has(delta)) linear.set(delta, withWavelet(delta));
+  return linear.get(delta);
+}
+
+function withWavelet(delta) {
   return delta.map((d, i) => {
     const [output, plane] = [Math.floor(i / 300), Math.floor(i / 25) % 12];
     const [q, p] = [(Math.floor(i / 5) % 5) - 2, (i % 5) - 2];
