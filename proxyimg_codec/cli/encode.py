@@ -62,11 +62,12 @@ def _add_aims(p: argparse.ArgumentParser) -> None:
     """Adds the flags for quality, size and effort."""
     add = p.add_argument
     add("-q", "--quality", type=float, metavar="0-100", help="default 50")
-    add("--target-bpp", type=float, metavar="B", help="bits a pixel of the whole file, hit within "
-        "2 %%, instead of -q")  # fmt: skip
-    add("--target-size", type=float, metavar="BYTES", help="bytes of the whole file, instead of -q")
-    add("--target-psnr", type=float, metavar="DB", help="PSNR of the decoded picture, instead of "
-        "-q")  # fmt: skip
+    add("--target-bpp", type=float, metavar="B", help="most bits a pixel of the whole file, "
+        "and 2 %% less at the least, instead of -q")  # fmt: skip
+    add("--target-size", type=float, metavar="BYTES", help="most bytes of the whole file, and "
+        "2 %% less at the least, instead of -q")
+    add("--target-psnr", type=float, metavar="DB", help="PSNR of the decoded picture, within 0.1, "
+        "instead of -q")  # fmt: skip
     add("--tune", choices=["mse", "ms-ssim"], default="mse", help="what to be good at: PSNR "
         "(default), or MS-SSIM; texture pyramid")  # fmt: skip
     add("--texture", choices=["auto", "implicit", "pyramid"], default="auto", help="coder: pyramid "

@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -98,17 +99,29 @@ def encode(
     source = source_of(behind, settings, width, height)
     regions = None if masks is None else regions_of(masks, height, width)
     plan = _planned(picture, settings, regions, report)
-    premultiplied = picture.copy()
-    premultiplied[..., :3] *= picture[..., 3:]
+    premultiplied = picture if plan.opaque else _premultiplied(picture)
     plan = with_meshes(premultiplied, plan, settings)
+    finished = partial(_finished, settings=settings, depth=depth, blocks=dict(blocks or {}))
     if settings.pyramid and (behind is not None or not plain(premultiplied)):
         from .pyramid.picture import encode_picture
-        from .pyramid.tiles import with_tiles
 
-        image = with_tiles(encode_picture(picture, plan, settings, report, source), settings)
-    else:
-        image = _with_network(premultiplied, plan, settings, report)
-    return replace(image, depth=depth, blocks=dict(blocks or {}))
+        return encode_picture(picture, plan, settings, report, finished, source)
+    return finished(_with_network(premultiplied, plan, settings, report))
+
+
+def _finished(
+    found: Picture, settings: Settings, depth: int, blocks: Mapping[str, bytes]
+) -> Picture:
+    """Gives a picture what its file has beside layers."""
+    from .pyramid.tiles import with_tiles
+
+    return replace(with_tiles(found, settings), depth=depth, blocks=blocks)
+
+
+def _premultiplied(picture: Floats) -> Floats:
+    out = picture.copy()
+    out[..., :3] *= picture[..., 3:]
+    return out
 
 
 def _with_options(settings: Settings, options: Mapping[str, Any]) -> Settings:

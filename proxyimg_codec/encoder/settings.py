@@ -59,9 +59,11 @@ class Settings:
             another setting needs it or the picture has a single colour, and pyramid otherwise.
         tune: Measure of errors: ``mse``, or ``ms-ssim``, by which they count less in busy parts of
             the picture; pyramid only.
-        target_bpp: Size of the file in bits per pixel, instead of `quality`; pyramid only.
-        target_size: Size of the file in bytes, instead of `quality`; pyramid only.
-        target_psnr: PSNR of the decoded picture in dB, instead of `quality`; pyramid only.
+        target_bpp: Most bits per pixel of the file, used up to 2 % where the picture needs them,
+            instead of `quality`; pyramid only.
+        target_size: Most bytes of the file, likewise; pyramid only.
+        target_psnr: PSNR of the decoded picture in dB, within 0.1, instead of `quality`; pyramid
+            only.
         max_layers: Most layers that the segmenter may find, 1..64; 1 does without it.
         segmenter: Name of the segmenter, see `plugins`; or a model: its path, or its name as
             `pxi-models` lists it.

@@ -203,7 +203,7 @@ def encoded(
         ValueError: The magnitude of a latent is `context.LIMIT` or more.
         UnsupportedError: The model is unknown.
     """
-    if any(np.abs(y).max() >= context.LIMIT for y in (*latents.levels, latents.lowest)):
+    if any(max(y.max(), -y.min()) >= context.LIMIT for y in (*latents.levels, latents.lowest)):
         raise ValueError(context.BAD_LATENT)
     levels = len(latents.levels)
     shape = cells_of(size, cell)
