@@ -284,7 +284,7 @@ class Job:
             whole.insert(0, np.rint(left.pop()).astype(np.int32))
         return coded.encoded(
             Latents(tuple(whole[:-1]), whole[-1]), r.size, self.step, r.cells, CELL,
-            1 if r.grey else 3, self.number, self.shifts,
+            1 if r.grey else 3, self.number, self.shifts, likely=self.bits / 8,
         )  # fmt: skip
 
     def find_shifts(self) -> None:

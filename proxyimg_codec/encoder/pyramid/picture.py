@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from ...geometry.boundary import Boundary
 from ...model import Layer, Layers, Picture
+from ...texture.completion import Copies
 from ...texture.network import Floats
 from ...texture.occlusion import Occlusion
 from ...texture.planes import Planes, blocks
@@ -71,11 +73,15 @@ def encode_picture(
     for k, each in softs.items():
         numbers[k] = {"behind": len(rasters), "matte": len(rasters) + 1}
         rasters += [each.behind, each.matte]
-    copies = []
-    for k, (_, cuts) in enumerate(views):
-        report("hidden", k, len(views))
+
+    def copied(k: int) -> Copies | None:
         soft = softs[k].samples if k in softs else None
-        copies.append(None if own and k == 0 else copies_of(picture, cuts, settings, soft))
+        return None if own and k == 0 else copies_of(picture, views[k][1], settings, soft)
+
+    report("hidden", 0, 1)
+    with ThreadPoolExecutor(settings.jobs) as pool:
+        copies = list(pool.map(copied, range(len(views))))
+    report("hidden", 1, 1)
 
     def picture_of(sources: Sequence[Planes]) -> Picture:
         alpha = sources[1] if shared > 1 else None
@@ -124,7 +130,7 @@ def encode_rasters(
     Raises:
         UsageError: A target size or PSNR is out of reach.
     """
-    effort = EFFORTS[settings.effort - 1]
+    effort = EFFORTS[settings.effort_for(original[..., 0].size) - 1]
     work = sum(r.samples[..., 0].size * effort.turns(r.structural) for r in rasters)
     done = 0
 
