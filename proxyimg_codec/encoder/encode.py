@@ -16,7 +16,7 @@ from .._version import __version__
 from ..container import meta
 from ..errors import UsageError
 from ..io.color import cicp_problem
-from ..io.samples import to_float
+from ..io.samples import standard, to_float
 from ..limits import DEFAULT_LIMITS, enough_memory
 from ..model import Layer, Layers, Picture
 from ..texture.implicit import ImplicitTexture
@@ -31,6 +31,7 @@ from .shapes.layers import Plan, plan_layers
 from .shapes.mask_arrays import Masks, regions_of
 from .shapes.masks import Region
 from .shapes.meshes import with_meshes
+from .suited import tell_if_unsuited
 
 CODES_MAX = DEFAULT_LIMITS.codes
 """Most codes that readers accept by default; codes of a large picture lie further apart."""
@@ -105,7 +106,10 @@ def encode(
     if settings.pyramid and (behind is not None or not plain(premultiplied)):
         from .pyramid.picture import encode_picture
 
-        return encode_picture(picture, plan, settings, report, finished, source)
+        image = encode_picture(picture, plan, settings, report, finished, source)
+        if settings.texture == "auto":
+            tell_if_unsuited(standard(np.asarray(pixels)), image)
+        return image
     return finished(_with_network(premultiplied, plan, settings, report))
 
 
