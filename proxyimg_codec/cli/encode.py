@@ -62,17 +62,23 @@ def _add_aims(p: argparse.ArgumentParser) -> None:
     """Adds the flags for quality, size and effort."""
     add = p.add_argument
     add("-q", "--quality", type=float, metavar="0-100", help="default 50")
-    add("--target-bpp", type=float, metavar="B", help="bits a pixel of the whole file, hit within "
-        "2 %%, instead of -q")  # fmt: skip
-    add("--target-size", type=float, metavar="BYTES", help="bytes of the whole file, instead of -q")
-    add("--target-psnr", type=float, metavar="DB", help="PSNR of the decoded picture, instead of "
-        "-q")  # fmt: skip
+    add("--target-bpp", type=float, metavar="B", help="most bits a pixel of the whole file, "
+        "and 2 %% less at the least, instead of -q")  # fmt: skip
+    add(
+        "--target-size",
+        type=float,
+        metavar="BYTES",
+        help="most bytes of the whole file, and 2 %% less at the least, instead of -q",
+    )
+    add("--target-psnr", type=float, metavar="DB", help="PSNR of the decoded picture, within 0.1, "
+        "instead of -q")  # fmt: skip
     add("--tune", choices=["mse", "ms-ssim"], default="mse", help="what to be good at: PSNR "
         "(default), or MS-SSIM; texture pyramid")  # fmt: skip
     add("--texture", choices=["auto", "implicit", "pyramid"], default="auto", help="coder: pyramid "
         "(the smallest files), implicit (the paper's: a network in the file, resolution-free), or "
         "auto: pyramid unless another flag needs implicit (default)")  # fmt: skip
-    add("-e", "--effort", type=int, metavar="1-9", help="how long to optimize; default 5")
+    add("-e", "--effort", type=int, metavar="1-9", help="how long to optimize; default 5, for a "
+        "picture of 8 megapixels or more 4")  # fmt: skip
     add("--preset", choices=PRESET_NAMES, default="default",
         help="effort 2, 5 or 8; paper: the literal method of ProxyImg, 4-bit codes and network, "
         "Chamfer boundaries. Other flags go before it")  # fmt: skip
@@ -253,6 +259,7 @@ def encoded(source: bytes, args: argparse.Namespace, settings: Any, bar: Bar) ->
         The encoded picture, and the original pixels [H, W, C] to compare it with.
     """
     from ..encoder.encode import encode
+    from ..encoder.settings import EFFORT
     from ..encoder.shapes.mask_files import load_masks
     from ..io.raster import parse, stripped
 
@@ -281,6 +288,8 @@ def encoded(source: bytes, args: argparse.Namespace, settings: Any, bar: Bar) ->
         behind=None if behind is None else behind.pixels, progress=progress,
     )  # fmt: skip
     notes = [*picture.notes]
+    if settings.effort is None and (effort := settings.effort_for(height * width)) != EFFORT:
+        notes.append(f"a large picture: effort {effort} instead of {EFFORT}; -e chooses another")
     notes += [] if behind is None else [f"{args.behind}: {note}" for note in behind.notes]
     if masks is None and settings.max_layers > 1 and len(image.layers) == 1:
         notes.append("no object was found: one layer; point at what is to be one (--point)")

@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -15,7 +16,7 @@ from .._version import __version__
 from ..container import meta
 from ..errors import UsageError
 from ..io.color import cicp_problem
-from ..io.samples import to_float
+from ..io.samples import standard, to_float
 from ..limits import DEFAULT_LIMITS, enough_memory
 from ..model import Layer, Layers, Picture
 from ..texture.implicit import ImplicitTexture
@@ -30,6 +31,7 @@ from .shapes.layers import Plan, plan_layers
 from .shapes.mask_arrays import Masks, regions_of
 from .shapes.masks import Region
 from .shapes.meshes import with_meshes
+from .suited import tell_if_unsuited
 
 CODES_MAX = DEFAULT_LIMITS.codes
 """Most codes that readers accept by default; codes of a large picture lie further apart."""
@@ -98,17 +100,32 @@ def encode(
     source = source_of(behind, settings, width, height)
     regions = None if masks is None else regions_of(masks, height, width)
     plan = _planned(picture, settings, regions, report)
-    premultiplied = picture.copy()
-    premultiplied[..., :3] *= picture[..., 3:]
+    premultiplied = picture if plan.opaque else _premultiplied(picture)
     plan = with_meshes(premultiplied, plan, settings)
+    finished = partial(_finished, settings=settings, depth=depth, blocks=dict(blocks or {}))
     if settings.pyramid and (behind is not None or not plain(premultiplied)):
         from .pyramid.picture import encode_picture
-        from .pyramid.tiles import with_tiles
 
-        image = with_tiles(encode_picture(picture, plan, settings, report, source), settings)
-    else:
-        image = _with_network(premultiplied, plan, settings, report)
-    return replace(image, depth=depth, blocks=dict(blocks or {}))
+        image = encode_picture(picture, plan, settings, report, finished, source)
+        if settings.texture == "auto":
+            tell_if_unsuited(standard(np.asarray(pixels)), image)
+        return image
+    return finished(_with_network(premultiplied, plan, settings, report))
+
+
+def _finished(
+    found: Picture, settings: Settings, depth: int, blocks: Mapping[str, bytes]
+) -> Picture:
+    """Gives a picture what its file has beside layers."""
+    from .pyramid.tiles import with_tiles
+
+    return replace(with_tiles(found, settings), depth=depth, blocks=blocks)
+
+
+def _premultiplied(picture: Floats) -> Floats:
+    out = picture.copy()
+    out[..., :3] *= picture[..., 3:]
+    return out
 
 
 def _with_options(settings: Settings, options: Mapping[str, Any]) -> Settings:

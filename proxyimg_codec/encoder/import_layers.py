@@ -143,11 +143,10 @@ def _stacked(
         return cleaned
 
     def finished(found: Picture) -> Picture:
-        return _merged([found], picture, covered)
+        return with_tiles(_merged([found], picture, covered), settings)
 
     pairs = list(zip(plans, channels, strict=True))
-    found = encode_stack(pairs, pixels_of, finished, composite(picture), settings, report)
-    return with_tiles(found, settings)
+    return encode_stack(pairs, pixels_of, finished, composite(picture), settings, report)
 
 
 def _fitted(

@@ -13,7 +13,7 @@ from ..texture.network import NetShape
 
 PRESETS: dict[str, dict[str, Any]] = {
     "fast": {"effort": 2},
-    "default": {"effort": 5},
+    "default": {},
     "best": {"effort": 8},
     "paper": {
         "texture": "implicit",
@@ -24,6 +24,9 @@ PRESETS: dict[str, dict[str, Any]] = {
     },
 }
 """Fields of `Settings` that each preset changes; ``paper`` is the method of ProxyImg."""
+
+EFFORT, LARGE, LARGE_EFFORT = 5, 1 << 23, 4
+"""Effort by default, and from how many pixels on it is how much."""
 
 EFFORT_STEPS = (500, 1000, 2000, 5000, 10000, 16000, 24000, 40000, 60000)
 """Optimizer steps of implicit textures at effort 1..9; half of them train through rounding."""
@@ -54,14 +57,17 @@ class Settings:
         quality: Quality, 0..100. For a pyramid it sets the quantization step: about 0.05 to 2 bits
             per pixel on photographs. For implicit textures it sets the spacing of codes, the bits
             per code, and the width of the network.
-        effort: Effort, 1..9; sets the number of optimizer steps or rounds of refinement.
+        effort: Effort, 1..9; sets the number of optimizer steps or rounds of refinement; None = 5,
+            and 4 for a picture of 8 megapixels or more.
         texture: Coder of textures: ``pyramid``, ``implicit`` or ``auto``, which is implicit if
             another setting needs it or the picture has a single colour, and pyramid otherwise.
         tune: Measure of errors: ``mse``, or ``ms-ssim``, by which they count less in busy parts of
             the picture; pyramid only.
-        target_bpp: Size of the file in bits per pixel, instead of `quality`; pyramid only.
-        target_size: Size of the file in bytes, instead of `quality`; pyramid only.
-        target_psnr: PSNR of the decoded picture in dB, instead of `quality`; pyramid only.
+        target_bpp: Most bits per pixel of the file, used up to 2 % where the picture needs them,
+            instead of `quality`; pyramid only.
+        target_size: Most bytes of the file, likewise; pyramid only.
+        target_psnr: PSNR of the decoded picture in dB, within 0.1, instead of `quality`; pyramid
+            only.
         max_layers: Most layers that the segmenter may find, 1..64; 1 does without it.
         segmenter: Name of the segmenter, see `plugins`; or a model: its path, or its name as
             `pxi-models` lists it.
@@ -96,7 +102,7 @@ class Settings:
     """
 
     quality: float = 50.0
-    effort: int = 5
+    effort: int | None = None
     texture: str = "auto"
     tune: str = "mse"
     target_bpp: float | None = None
@@ -133,7 +139,7 @@ class Settings:
                              "integers") from None  # fmt: skip
         checks = [
             (math.isfinite(self.quality) and 0 <= self.quality <= 100, "quality", "0..100"),
-            (1 <= self.effort <= 9, "effort", "1..9"),
+            (self.effort is None or 1 <= self.effort <= 9, "effort", "1..9"),
             (self.texture in TEXTURES, "texture", " or ".join(TEXTURES)),
             (self.tune in TUNES, "tune", " or ".join(TUNES)),
             (1 <= self.max_layers <= 64, "max_layers", "1..64"),
@@ -235,8 +241,12 @@ class Settings:
         """Optimizer steps of implicit textures; the unit of progress, 1000 for pyramids."""
         if self.pyramid:
             return 1000
-        steps = EFFORT_STEPS[self.effort - 1]
+        steps = EFFORT_STEPS[(self.effort or EFFORT) - 1]
         return round(NODE_SHARE * steps) if self.sampling == "node" else steps
+
+    def effort_for(self, pixels: int) -> int:
+        """Effort for a picture with so many pixels."""
+        return self.effort or (EFFORT if pixels < LARGE else LARGE_EFFORT)
 
     @property
     def bits(self) -> int:

@@ -7,6 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from .samples import strips
+
 
 def psnr_8bit(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> float | None:
     """PSNR in dB of two 8-bit pictures; None if they are equal.
@@ -18,9 +20,11 @@ def psnr_8bit(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> float | None:
         b: Picture of the same height and width, with 3 or 4 channels.
     """
     opaque = all(p.shape[2] == 3 or (p[..., 3] == 255).all() for p in (a, b))
-    x, y = _premultiplied(a, opaque), _premultiplied(b, opaque)
-    error = float(((x - y) ** 2).mean())
-    return None if error == 0 else 10 * math.log10(255**2 / error)
+    total, count = 0.0, a[..., 0].size * (3 if opaque else 4)
+    for rows in strips(a):
+        x, y = (_premultiplied(p[rows], opaque) for p in (a, b))
+        total += float(((x - y) ** 2).sum())
+    return None if total == 0 else 10 * math.log10(255**2 * count / total)
 
 
 def _premultiplied(p: NDArray[np.uint8], opaque: bool) -> NDArray[np.float64]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,9 @@ from ..errors import InputError
 
 Floats = NDArray[np.float32]
 
+
+STRIP = 1 << 18
+"""Pixels of a strip, about."""
 
 RULE = "uint8, uint16, uint32 or uint64 (divided by the largest value), bool, or float in 0..1"
 """What samples may be. Integers with a sign are none: nothing says what their white is."""
@@ -51,6 +55,13 @@ def standard(pixels: NDArray[Any]) -> NDArray[Any]:
     raise InputError(f"samples of type {pixels.dtype} are not supported; use {RULE}")
 
 
+def strips(picture: NDArray[Any]) -> Iterator[slice]:
+    """Yields the rows of a picture [H, W, ...], so few at once that they take little memory."""
+    count = max(STRIP // picture.shape[1], 1)
+    for top in range(0, len(picture), count):
+        yield slice(top, top + count)
+
+
 def unit(pixels: NDArray[Any]) -> Floats:
     """Returns uint8, uint16 or float32 samples as float32, integers divided by their largest."""
     if pixels.dtype.kind == "f":
@@ -80,7 +91,19 @@ def to_float(pixels: NDArray[Any]) -> tuple[Floats, int]:
         InputError: The array has a wrong shape or type, is empty, not finite, or outside 0..1.
     """
     pixels = standard(pixels)
-    depth, values = 8 if pixels.dtype == np.uint8 else 16, unit(pixels)
+    if pixels.dtype.kind == "f":
+        _check_range(pixels)
+    channels = pixels.shape[2]
+    out = np.ones((*pixels.shape[:2], 4), np.float32)
+    for rows in strips(out):
+        values = unit(pixels[rows])
+        out[rows, :, :3] = values[..., :3] if channels > 2 else values[..., :1]
+        if channels in (2, 4):
+            out[rows, :, 3] = values[..., -1]
+    return out, 8 if pixels.dtype == np.uint8 else 16
+
+
+def _check_range(values: Floats) -> None:
     if not np.isfinite(values).all():
         raise InputError("the picture has NaN or infinite samples; replace them first")
     low, high = float(values.min()), float(values.max())
@@ -89,9 +112,3 @@ def to_float(pixels: NDArray[Any]) -> tuple[Floats, int]:
             f"samples of {low:.4g} to {high:.4g} do not lie in 0..1; scale them first, or clip "
             "them (pxi-encode --tone clip)"
         )
-    channels = values.shape[2]
-    out = np.ones((*values.shape[:2], 4), np.float32)
-    out[..., :3] = values[..., :3] if channels > 2 else values[..., :1]
-    if channels in (2, 4):
-        out[..., 3] = values[..., -1]
-    return out, depth

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..io.psnr import psnr_8bit
-from ..io.samples import to_float
+from ..io.samples import standard, strips, to_float
 from ..model import Pictured
 from .pixels import render
 
@@ -26,5 +26,8 @@ def psnr(original: NDArray[Any], image: Pictured) -> float | None:
     Raises:
         InputError: `original` is not a picture.
     """
-    eight_bit = np.rint(to_float(original)[0] * 255).astype(np.uint8)
+    given = standard(np.asarray(original))
+    eight_bit = np.empty((*given.shape[:2], 4), np.uint8)
+    for rows in strips(given):
+        eight_bit[rows] = np.rint(to_float(given[rows])[0] * 255)
     return psnr_8bit(eight_bit, render(image))

@@ -182,7 +182,7 @@ def unpack(fields: Mapping[str, Any], where: str = "chunk PLAN") -> Planes:
 def encoded(
     latents: Latents, size: tuple[int, int], step: int, support: NDArray[np.bool_] | None = None,
     cell: int = 3, components: int = 3, number: int = 2,
-    shifts: tuple[int, ...] | None = None, tile: int | None = None,
+    shifts: tuple[int, ...] | None = None, tile: int | None = None, likely: float | None = None,
 ) -> Planes:  # fmt: skip
     """Encodes latents as planes.
 
@@ -198,12 +198,14 @@ def encoded(
             by default 0.
         tile: Binary logarithm of the side of a tile in positions, 0 = no tiles; by default large
             rasters have tiles that cost little.
+        likely: Estimate of the bytes of the streams, by which tiles are chosen; by default they are
+            coded without tiles first, to know.
 
     Raises:
         ValueError: The magnitude of a latent is `context.LIMIT` or more.
         UnsupportedError: The model is unknown.
     """
-    if any(np.abs(y).max() >= context.LIMIT for y in (*latents.levels, latents.lowest)):
+    if any(max(y.max(), -y.min()) >= context.LIMIT for y in (*latents.levels, latents.lowest)):
         raise ValueError(context.BAD_LATENT)
     levels = len(latents.levels)
     shape = cells_of(size, cell)
@@ -231,6 +233,8 @@ def encoded(
         "tile": tile or 0,
         "details": [min(round(DETAIL_UNIT * v), DETAIL_MAX) for v in details],
     }
+    if tile is None and likely is not None:
+        tile = fields["tile"] = _tile_of(Grid.of(fields), likely)
     data, escapes = encode(fields, support, latents)
     if tile is None and (side := _tile_of(Grid.of(fields), len(data))):
         fields["tile"] = side
@@ -238,7 +242,7 @@ def encoded(
     return Planes({**fields, "escapes": escapes, "data": data})
 
 
-def _tile_of(grid: Grid, size: int) -> int:
+def _tile_of(grid: Grid, size: float) -> int:
     """Binary logarithm of the side of tiles for a stream of a size; 0 if it shall have none."""
     levels = range(1, grid.levels + 1)
     large = grid.size[0] * grid.size[1] >= LARGE

@@ -81,7 +81,7 @@ def finer(
     """
     weights = model.synthesis[min(level, len(model.synthesis)) - 1]
     t = np.float32((step - STEP_ORIGIN) / 128)
-    gain = _gains(weights, step)
+    gain = gains(weights, step)
     bias = weights.first_bias.floats + weights.first_by_step.floats * t
     linear = _linear(model, level).astype(np.float32)
     if kernel.available():
@@ -89,7 +89,7 @@ def finer(
     return _filtered(weights, linear, gain, bias, low, latents, shape)
 
 
-def _gains(weights: Synthesis, step: int) -> Floats:
+def gains(weights: Synthesis, step: int) -> Floats:
     """Gains [9] of latents."""
     t = np.float32((step - STEP_ORIGIN) / 128)
     # In double precision, so that all machines round it to the same numbers.
@@ -178,8 +178,9 @@ def details(model: Model, latents: Sequence[Ints], step: int, size: tuple[int, i
     out = []
     for level, found in enumerate(latents, 1):
         weights = model.synthesis[min(level, len(model.synthesis)) - 1]
-        gain = _gains(weights, step).astype(np.float64)
-        power = np.square(found.astype(np.float64)).sum((1, 2)) * gain**2
+        gain = gains(weights, step).astype(np.float64)
+        squares = [np.square(band.astype(np.float64)).sum() for band in found]  # exact
+        power = np.array(squares) * gain**2
         total = float((power.reshape(3, 3).sum(1) * weight).sum())
         out.append(float(np.sqrt(total / (size[0] * size[1]))))
     return out

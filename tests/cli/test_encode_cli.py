@@ -518,6 +518,17 @@ def test_target_size(encode):
     assert len(encode("--target-size", "1500", "--layers", "1")) == pytest.approx(1500, rel=0.02)
 
 
+def test_a_large_picture_takes_less_effort_and_says_so(monkeypatch, tool, photo_png, tmp_path):
+    monkeypatch.setattr("proxyimg_codec.encoder.settings.LARGE", 1000)
+    files = []
+    for flags in ((), ("-e", "4"), ("-e", "5")):
+        files.append(tmp_path / f"{len(files)}.pxi")
+        ran = tool("encode", photo_png, files[-1], "--layers", "1", *flags)
+        assert ("effort 4 instead of 5; -e chooses another" in ran.err) == (not flags)
+    by_size, four, five = (file.read_bytes() for file in files)
+    assert by_size == four != five
+
+
 def test_quality_and_target_contradict_each_other(tool, photo_png, tmp_path):
     ran = tool("encode", photo_png, tmp_path / "a.pxi", "-q", "30", "--target-bpp", "1", code=2)
     assert "contradict" in ran.err

@@ -41,6 +41,9 @@ SYNTHESIS = (
 
 ANALYSIS = SYNTHESIS[:-1]
 
+SPARSE = (3, 1)
+"""Distance of the latents, down and across, from which shifts of the scale index are found."""
+
 STRIP = 256
 """Rows whose colours are converted at once, which bounds memory."""
 

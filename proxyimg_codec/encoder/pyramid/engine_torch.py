@@ -32,8 +32,8 @@ except ModuleNotFoundError as error:
 REACH = 256
 """Samples that the analysis of a window sees beyond it, as many as its coarsest filters reach."""
 
-SPARSE = 3
-"""Distance of the latents, across and down, from which shifts of the scale index are found."""
+SPARSE = (3, 3)
+"""Distance of the latents, down and across, from which shifts of the scale index are found."""
 
 
 def tensor(values: NDArray[np.floating]) -> torch.Tensor:
@@ -129,7 +129,7 @@ def bits_by_shift(goal: Goal, latents: Sequence[Floats], threads: int) -> NDArra
     """
     own = list(map(tensor, latents))
     likely = load(goal.model).likelihoods(own, torch.tensor([2.0 ** (goal.step / 64)]))
-    few = np.s_[..., ::SPARSE, ::SPARSE]
+    few = np.s_[..., :: SPARSE[0], :: SPARSE[1]]
     out = np.zeros((2 * len(likely), len(SHIFTS)))
     for k, p in enumerate(likely):
         y, mean, scale = (v[few] for v in (own[k], *p))

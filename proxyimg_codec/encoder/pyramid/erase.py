@@ -146,14 +146,14 @@ class _Erasure(Job):
             free = [a & b for a, b in zip(free, goal.free, strict=True)]
         return goal._replace(free=free, price=PRICE)
 
-    def planes(self) -> Planes:
-        """Codes the present latents.
+    def planes(self, keep: bool = True) -> Planes:
+        """Codes the present latents, which stay.
 
         Changed contexts may take a latent that did not change for certainly 0, though it is not.
         Then the scales of its level are shifted until it is coded again, or no more is allowed.
         """
         found = [np.rint(y).astype(np.int32) for y in self.latents]
-        packed, shifts = self.old.packed, list(self._shifts())
+        packed, shifts = self.old.packed, list(self.shifts)
         fixed = [~m for m in self.free]
         while True:
             made = coded.encoded(
@@ -171,8 +171,9 @@ class _Erasure(Job):
             for at in lost:
                 shifts[at] += 1
 
-    def _shifts(self) -> tuple[int, ...]:
-        return tuple(v - SHIFT_ORIGIN for v in self.old.packed["shifts"])
+    def find_shifts(self) -> None:
+        """Takes those of the old planes."""
+        self.shifts = tuple(v - SHIFT_ORIGIN for v in self.old.packed["shifts"])
 
 
 def _blanked(samples: Floats, kept: NDArray[np.bool_]) -> Floats:

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...codec.write import to_bytes
-from ...errors import UsageError
 from ...geometry.boundary import Boundary
 from ...model import Layer, Layers, Picture
-from ...render.quality import psnr
+from ...texture.completion import Copies
 from ...texture.network import Floats
 from ...texture.occlusion import Occlusion
 from ...texture.planes import Planes, blocks
@@ -28,39 +26,20 @@ from ..shapes.layers import Plan, alike
 from .encode import CELL, EFFORTS, Raster, encode
 from .goal import Effort
 from .matte import Soft, soft_rasters
+from .target import aimed
 
 Report = Callable[[str, int, int], None]
 Box = tuple[int, int, int, int]
 View = tuple[Box, Occlusion | None]
-
-TOLERANCE = 0.015
-"""Deviation from a target that is good enough: of the logarithm of a size, or of PSNR / 5 dB."""
-
-TRIES = 6
-"""Most attempts to meet a target, with little effort and again with full effort."""
-
-FIRST_STEP, LAST_STEP = 0, 640
-"""Range of the index s of the quantization step 2**(s / 64)."""
-
-
-@dataclass
-class Interrupts:
-    """Record of `KeyboardInterrupt`, after which refinement stops and searches end.
-
-    Attributes:
-        seen: Whether there was one.
-    """
-
-    seen: bool = False
-
 
 SURE = 0.5
 """Least coverage at which alpha is taken from the pixel; it continues beyond."""
 
 
 def encode_picture(
-    picture: Floats, plan: Plan, settings: Settings, report: Report, behind: Source | None = None
-) -> Picture:
+    picture: Floats, plan: Plan, settings: Settings, report: Report,
+    finished: Callable[[Picture], Picture], behind: Source | None = None,
+) -> Picture:  # fmt: skip
     """Encodes planned layers with pyramid textures.
 
     On `KeyboardInterrupt` during refinement, the picture has the latents that were found so far.
@@ -70,10 +49,11 @@ def encode_picture(
         plan: Plan of the layers.
         settings: Settings of the encoder.
         report: Called with the name of a stage, and its numbers of units done and in all.
+        finished: Gives the picture, of 8 bits and without metadata, what else its file has.
         behind: What gives the hidden pixels of the back layer; None if they are copied or filled.
 
     Returns:
-        A picture with a depth of 8 bits, without metadata.
+        What `finished` makes.
 
     Raises:
         InputError: An inpainter fails.
@@ -93,11 +73,15 @@ def encode_picture(
     for k, each in softs.items():
         numbers[k] = {"behind": len(rasters), "matte": len(rasters) + 1}
         rasters += [each.behind, each.matte]
-    copies = []
-    for k, (_, cuts) in enumerate(views):
-        report("hidden", k, len(views))
+
+    def copied(k: int) -> Copies | None:
         soft = softs[k].samples if k in softs else None
-        copies.append(None if own and k == 0 else copies_of(picture, cuts, settings, soft))
+        return None if own and k == 0 else copies_of(picture, views[k][1], settings, soft)
+
+    report("hidden", 0, 1)
+    with ThreadPoolExecutor(settings.jobs) as pool:
+        copies = list(pool.map(copied, range(len(views))))
+    report("hidden", 1, 1)
 
     def picture_of(sources: Sequence[Planes]) -> Picture:
         alpha = sources[1] if shared > 1 else None
@@ -107,10 +91,11 @@ def encode_picture(
             shown = PyramidTexture(sources[0], alpha, box, cuts=cuts, copies=copied, **planes)
             layers.append(Layer(v.name, box, v.boundary, shown, v.mesh, parent=v.parent))
         channels = 4 if softs else plan.channels
-        return Picture(width, height, channels, plan.opaque, 8, Layers(layers), (),
-                       groups=plan.groups)  # fmt: skip
+        found = Picture(width, height, channels, plan.opaque, 8, Layers(layers), (),
+                        groups=plan.groups)  # fmt: skip
+        return finished(found)
 
-    return encode_rasters(rasters, picture_of, picture, settings, report)
+    return encode_rasters(rasters, shared, picture_of, picture, settings, report)
 
 
 def _views(picture: Floats, plan: Plan) -> tuple[list[View], dict[int, Soft]]:
@@ -129,13 +114,14 @@ def _views(picture: Floats, plan: Plan) -> tuple[list[View], dict[int, Soft]]:
 
 
 def encode_rasters(
-    rasters: Sequence[Raster], picture_of: Callable[[Sequence[Planes]], Picture], original: Floats,
-    settings: Settings, report: Report,
+    rasters: Sequence[Raster], shown: int, picture_of: Callable[[Sequence[Planes]], Picture],
+    original: Floats, settings: Settings, report: Report,
 ) -> Picture:  # fmt: skip
     """Encodes rasters so that the picture made of them meets the target of the settings, if any.
 
     Args:
         rasters: The rasters.
+        shown: Number of rasters, the first ones, that show in the picture at rest.
         picture_of: Makes the picture of the planes of all rasters.
         original: float32 [H, W, 4] in 0..1 with straight alpha: how the picture should look.
         settings: Settings of the encoder.
@@ -144,87 +130,23 @@ def encode_rasters(
     Raises:
         UsageError: A target size or PSNR is out of reach.
     """
-    interrupts = Interrupts()
-
-    def at(step: int, effort: Effort) -> Picture:
-        return picture_of(_coded(rasters, step, effort, settings, report, interrupts))
-
-    effort = EFFORTS[settings.effort - 1]
-    if settings.target is None:
-        return at(settings.step, effort)
-    return _aimed(at, original, settings, effort, interrupts)
-
-
-def _coded(
-    rasters: Sequence[Raster], step: int, effort: Effort, settings: Settings, report: Report,
-    interrupts: Interrupts,
-) -> list[Planes]:  # fmt: skip
-    """Encodes all rasters at the step of index `step`; records an interrupt in `interrupts`."""
+    effort = EFFORTS[settings.effort_for(original[..., 0].size) - 1]
     work = sum(r.samples[..., 0].size * effort.turns(r.structural) for r in rasters)
     done = 0
 
     def tick(samples: int) -> None:
         nonlocal done
         done += samples
-        report("texture", done * settings.steps // work, settings.steps)
+        report("texture", min(done * settings.steps // work, settings.steps), settings.steps)
 
+    if settings.target is not None:
+        return aimed(rasters, shown, picture_of, original, settings, effort, tick)
     out = []
     for raster in rasters:
-        planes, complete = encode(
-            raster, step, Effort(0, 0) if interrupts.seen else effort, settings.seed, tick,
-            settings.jobs,
-        )  # fmt: skip
-        interrupts.seen |= not complete
+        planes, complete = encode(raster, settings.step, effort, settings.seed, tick, settings.jobs)
+        effort = effort if complete else Effort(0, 0)
         out.append(planes)
-    return out
-
-
-def _aimed(
-    at: Callable[[int, Effort], Picture], picture: Floats, settings: Settings, effort: Effort,
-    interrupts: Interrupts,
-) -> Picture:  # fmt: skip
-    """Finds a step at which the picture meets the target: with little effort first, then with full.
-
-    Args:
-        at: Encodes the picture at an index of the step, with some effort.
-        picture: float32 [H, W, 4] in 0..1 with straight alpha.
-        settings: Settings with a target.
-        effort: Full effort.
-        interrupts: Record that ends the search early.
-
-    Raises:
-        UsageError: The target is out of reach.
-    """
-    kind, wanted = settings.target or ("", 0.0)
-    pixels = picture.shape[0] * picture.shape[1]
-
-    def off(image: Picture) -> float:
-        """Deviation from the target as for `TOLERANCE`; positive if there are too many bits."""
-        if kind == "psnr":
-            found = psnr(picture if picture[..., 3].min() < 1 else picture[..., :3], image)
-            return (99.0 if found is None else found) / 5 - wanted / 5
-        size = len(to_bytes(image))
-        return math.log((8 * size / pixels if kind == "bpp" else size) / wanted)
-
-    step, slope = settings.step, -0.0095
-    for trial in (Effort(1, 1), effort):
-        seen: list[tuple[int, float]] = []
-        for _ in range(TRIES):
-            image = at(step, trial)
-            error = off(image)
-            seen.append((step, error))
-            if abs(error) <= TOLERANCE or interrupts.seen:
-                break
-            if len(seen) > 1 and seen[-2][0] != step:
-                measured = (error - seen[-2][1]) / (step - seen[-2][0])
-                slope = measured if -0.05 < measured < -0.001 else slope
-            moved = min(max(round(step - error / slope), FIRST_STEP), LAST_STEP)
-            if moved == step:
-                break
-            step = moved
-    if abs(error) > 2 * TOLERANCE and not interrupts.seen:
-        raise UsageError(f"target {kind} {wanted:g} is out of reach for this picture")
-    return image
+    return picture_of(out)
 
 
 def _view(boundaries: Sequence[Boundary | None], number: int, covered: Floats) -> View:

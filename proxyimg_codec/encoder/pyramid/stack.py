@@ -71,7 +71,7 @@ def encode_stack(
         most = max(channels for _, channels in plans)
         return finished(Picture(*size, most, False, 8, Layers(layers), ()))
 
-    return encode_rasters(rasters, picture_of, original, settings, report)
+    return encode_rasters(rasters, len(rasters), picture_of, original, settings, report)
 
 
 def box_of(boundary: Boundary | None, size: tuple[int, int]) -> Box:

@@ -52,6 +52,12 @@ class Window(NamedTuple):
         rows, columns = self.inner
         return int((rows.stop - rows.start) * (columns.stop - columns.start))
 
+    @property
+    def seen(self) -> int:
+        """Number of samples that the window sees."""
+        rows, columns = self.outer
+        return int((rows.stop - rows.start) * (columns.stop - columns.start))
+
     def at(self, level: int, inner: bool = False) -> tuple[slice, slice]:
         """Rows and columns of latents of a level that the window sees, or only those `inner`."""
         rows, columns = (

@@ -9,6 +9,9 @@ back.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +27,10 @@ from .refine import refined, spread
 Floats = NDArray[np.float64]
 Labels = NDArray[np.intp]
 Mask = NDArray[np.bool_]
+
+LARGEST = 2048
+"""Longest side of an opaque picture in which objects are sought; of larger ones it is a copy. The
+network sees less, and memory is bounded."""
 
 SEEDS = 32
 """Basins from which it is asked what belongs to the same object: the largest that stand out."""
@@ -60,6 +67,11 @@ def segment(
         and place. It is the only one if nothing stands out. The list is empty only if the support
         is.
     """
+    side = max(rgb.shape[:2])
+    if support is None and side > LARGEST:
+        size = tuple(max(1, round(n * LARGEST / side)) for n in rgb.shape[1::-1])
+        copy = cv2.resize(rgb, size, interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
+        return _enlarged(segment(copy, max_layers), rgb.shape[1::-1])
     whole = np.ones(rgb.shape[:2], np.bool_) if support is None else support
     if not whole.any():
         return []
@@ -70,6 +82,13 @@ def segment(
     maps.boundary[rim > 0] = 1
     labels = objects(scene_of(shown, maps), max_layers, support)
     return layers(rgb, labels, maps, support)
+
+
+def _enlarged(regions: list[Region], size: Sequence[int]) -> list[Region]:
+    """Regions of an opaque picture of `size` columns and rows, made of those of a smaller copy."""
+    masks = [cv2.resize(r.mask.astype(np.float32), size) >= 0.5 for r in regions]
+    masks[0] |= ~np.any(masks, axis=0)
+    return [replace(r, mask=m) for r, m in zip(regions, masks, strict=True)]
 
 
 def objects(scene: Scene, max_layers: int, support: Mask | None = None) -> Labels:

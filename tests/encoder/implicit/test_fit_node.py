@@ -207,9 +207,9 @@ def test_one_layer_and_one_colour(photo):
 @pytest.mark.parametrize(
     ("flags", "expected"),
     [
-        ((), ("node", "chamfer", 4, 4, 5)),
+        ((), ("node", "chamfer", 4, 4, None)),
         (("-e", "2", "--net-bits", "8", "--boundary", "lsq"), ("node", "lsq", 4, 8, 2)),
-        (("--feature-bits", "6", "-q", "90"), ("node", "chamfer", 6, 4, 5)),
+        (("--feature-bits", "6", "-q", "90"), ("node", "chamfer", 6, 4, None)),
     ],
 )
 def test_preset_paper_and_flags_that_go_before_it(flags, expected):

@@ -114,3 +114,15 @@ def test_any_size_is_a_partition(shape):
     support[-1, -1] = True
     (only,) = segment(rgb, 4, support)
     np.testing.assert_array_equal(only.mask, support)
+
+
+def test_a_large_picture_is_segmented_in_a_copy(monkeypatch):
+    """Of the same objects, at the size of the picture; each pixel is in one."""
+    y, x = np.mgrid[:223, :301]
+    disc = (x - 150) ** 2 + (y - 110) ** 2 < 60**2
+    rgb = np.where(disc[..., None], (230, 60, 40), (40, 90, 60)).astype(np.uint8)
+    monkeypatch.setattr(figures, "LARGEST", 144)
+    found = segment(rgb, 3)
+    assert [region.mask.shape for region in found] == [(223, 301)] * 2
+    assert iou(found[1].mask, disc) > 0.95
+    assert (found[0].mask | found[1].mask).all()
