@@ -55,7 +55,8 @@ LONGEST = (
     "generate/test_mixture.py",
     "conformance/test_package_numpy.py",
     "web/test_wasm.py",
-    "web/test_js_decoder.py",
+    "web/test_js_pyramids.py",
+    "web/test_js_pictures.py",
     "encoder/shapes/test_layers.py",
 )
 """Modules that go first, so that in the end no worker waits for another that has one of them."""
