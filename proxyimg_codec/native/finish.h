@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <vector>
 
 #include "level.h"
 
@@ -47,6 +48,49 @@ inline void painted(const Still &s) {
         const float colour[3] = {from[0], from[second], from[2 * second]};
         premultiplied(colour, 3, 1, s.colour + 4 * s.at[k]);
         s.known[s.at[k]] = 1;
+    }
+}
+
+struct Together {  // layers that show the same samples at points of a rectangle
+    const float *samples;            // [..][stride][channels] of a raster
+    const int64_t *rows, *columns;   // of the raster, of each row and column of points
+    const int32_t *const *covers;    // [layers][height][width] 0..full, front to back; or null where all is covered
+    float *out;                      // [height][width][4]
+    int64_t stride, height, width;
+    int32_t channels, layers, full;  // channels: 1 or 3
+};
+
+// Composites layers that show the same samples, clamped as in `premultiplied`, and summed as in `blend`.
+inline void together(const Together &s) {
+    const int64_t w = s.width, second = s.channels == 3;
+    std::vector<float> clear(w), colour[4], sum[4];
+    for (int c = 0; c < 4; c++) colour[c].assign(w, 1), sum[c].resize(w);
+    for (int64_t y = 0; y < s.height; y++) {
+        const float *line = s.samples + s.rows[y] * s.stride * s.channels;
+        for (int64_t x = 0; x < w; x++)
+            for (int c = 0; c < 3; c++) {
+                const float v = line[s.columns[x] * s.channels + c * second];
+                colour[c][x] = v > 0 ? v < 1 ? v : 1 : 0;
+            }
+        std::fill(clear.begin(), clear.end(), 1.f);
+        for (std::vector<float> &to : sum) std::fill(to.begin(), to.end(), 0.f);
+        for (int layer = 0; layer < s.layers; layer++) {
+            const int32_t *cover = s.covers[layer] ? s.covers[layer] + y * w : nullptr;
+            if (cover && !std::any_of(cover, cover + w, [](int32_t v) { return v; })) continue;
+            const float unit = 1.f / (float)s.full;
+            for (int c = 0; c < 4; c++) {
+                float *to = sum[c].data();
+                const float *from = colour[c].data(), *left = clear.data();
+                if (cover)
+                    for (int64_t x = 0; x < w; x++) to[x] += left[x] * ((float)cover[x] * unit) * from[x];
+                else
+                    for (int64_t x = 0; x < w; x++) to[x] += left[x] * from[x];
+            }
+            for (int64_t x = 0; x < w; x++) clear[x] *= cover ? 1 - (float)cover[x] * unit : 0;
+        }
+        float *to = s.out + 4 * y * w;
+        for (int64_t x = 0; x < w; x++)
+            for (int c = 0; c < 4; c++) *to++ = sum[c][x];
     }
 }
 

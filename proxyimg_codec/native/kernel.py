@@ -89,6 +89,7 @@ _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "pxi_blend": (None, [*(_ADDRESS,) * 4, _LONG]),
     "pxi_premultiplied": (None, [_ADDRESS, _INT, _LONG, _ADDRESS]),
     "pxi_painted": (None, [_ADDRESS]),
+    "pxi_together": (ct.c_int, [_ADDRESS]),
     "pxi_finished": (None, [_ADDRESS, _INT, _LONG, _INT, _INT, _ADDRESS]),
     "pxi_refine": (ct.c_int, [_ADDRESS]),
     "pxi_refine_slopes": (ct.c_int, [_ADDRESS]),
