@@ -29,7 +29,9 @@ struct Level {
     const uint8_t *bands;    // [height][width], bit b set where band b is coded
     const int32_t *given;    // [9][height][width] to encode, or null to decode
     int32_t *latents;        // [9][height][width], 0
-    int (*watch)(int done, int all);  // hears of progress, and stops the work by a 1; or null
+    // Hears of progress, and stops the work by a 1; or null. Position (y, x) is coded when more than
+    // t + min(height, t / 3 + 1) is done, t = x + 3 y.
+    int (*watch)(int done, int all);
 };
 
 struct Lowest {  // planes, decoded by ascending x + y
@@ -165,13 +167,17 @@ class LevelCoder {
     int16_t squash[FAR + 1];
     Window<Activation, PLANES> inputs;
     Rows<Activation> rows;               // of activations, [w + 2][width]
-    const std::unique_ptr<int16_t[]> ahead;  // [h][w][width]
+    const int most;                      // positions of a wave, and rows that it reaches
+    const std::unique_ptr<int16_t[]> ahead;  // [most][w][width], row y in place of row y - most
+    std::vector<std::pair<int, int>> spans;  // [h] from where to where anything is coded
     std::vector<Activation> seen;        // [h + 2][pitch][18]
     std::vector<uint8_t> busy;           // [h + 2][pitch] whether a latent is not 0
-    // Of a wave: positions (ys[i], wave - 3 ys[i]), activations [width], features, latents [9], whether
-    // one of these is not 0, and lists of positions: some to work on, and those with such latents.
+    // Of a wave: positions (ys[i], wave - 3 ys[i]), their places in `ahead`, activations [width], features,
+    // latents [9], whether one of these is not 0, and lists of positions: some to work on, and those with
+    // such latents.
     int at;
     std::vector<int32_t> ys, found, some, alive;
+    std::vector<const int16_t *> before;
     std::vector<Activation> z, mixed;
     std::vector<int16_t> features;
     std::vector<uint8_t> lit;
@@ -190,6 +196,7 @@ class LevelCoder {
     }
     int16_t feature(int v) const { return v < 0 ? -squash[std::min(-v, FAR)] : squash[std::min(v, FAR)]; }
     int16_t log_feature(int v) const { return (int16_t)s.logs[std::min<int64_t>(std::abs(v), s.n_logs - 1)]; }
+    int16_t *ahead_of(int y) const { return ahead.get() + (int64_t)(y % most) * w * width; }
     int64_t index(int i) const { return (int64_t)ys[i] * w + at - 3 * ys[i]; }
     Activation *own(int i) { return z.data() + (int64_t)i * width; }
     int64_t padded(int i) const { return (ys[i] + 2) * pitch + at - 3 * ys[i] + 2; }
@@ -246,33 +253,32 @@ class LevelCoder {
         }
     }
 
-    // Tells what is done, now and then; whether to stop.
-    bool stopped(int done) const {
-        return s.watch && done % 16 == 0 && s.watch(done, h + w + 3 * (h - 1));
-    }
-
-    // What does not depend on the level itself.
-    Wrong look_ahead() {
-        read(0);
-        for (int y = 0; y <= h; y++) {
-            if (stopped(y)) return STOPPED;
-            inputs.up();
-            rows.up();
-            Activation *last = rows[2];
-            read(y + 1);
-            if (y < h)
-                inputs(first, first_planes, w, [&](int x, int o, Sums v) {
-                    activate(last + (int64_t)(x + 1) * width + o, scaled(v, s.net.first_bits));
-                });
-            else
-                std::fill_n(last, row, (Activation)0);
-            if (y == 0) continue;
-            int16_t *to = ahead.get() + (int64_t)(y - 1) * w * width;
-            second(w, [&](int x) { return rows[0] + (int64_t)x * width; }, [&](int x, int o, Sums v) {
-                put(to + (int64_t)x * width + o, scaled(v, s.net.second_bits), -32768, 32767);
-            });
+    // The next row of the first layer, where something is coded at it or beside it.
+    void hide(int y) {
+        inputs.up(), rows.up();
+        read(y + 1);
+        Activation *to = rows[2];
+        if (y >= h) {
+            std::fill_n(to, row, (Activation)0);
+            return;
         }
-        return NOTHING;
+        int from = w, end = 0;
+        for (int k = std::max(y - 1, 0); k < std::min(y + 2, h); k++)
+            from = std::min(from, spans[k].first), end = std::max(end, spans[k].second);
+        inputs(first, first_planes, std::max(from - 1, 0), std::min(end + 1, w), [&](int x, int o, Sums v) {
+            activate(to + (int64_t)(x + 1) * width + o, scaled(v, s.net.first_bits));
+        });
+    }
+    // What does not depend on the level itself, of the next row.
+    void look_ahead(int y) {
+        if (y == 0) read(0), hide(0);
+        hide(y + 1);
+        const auto [from, end] = spans[y];
+        const Activation *above = rows[0] + (int64_t)from * width;
+        int16_t *to = ahead_of(y) + (int64_t)from * width;
+        second(end - from, [&](int k) { return above + (int64_t)k * width; }, [&](int k, int o, Sums v) {
+            put(to + (int64_t)k * width + o, scaled(v, s.net.second_bits), -32768, 32767);
+        });
     }
 
     // Codes the positions of a wave.
@@ -280,13 +286,13 @@ class LevelCoder {
         const int n = (int)ys.size();
         const auto mine = [&](int i) { return own(i); };
         const auto begin = [&](int i, int o, Sums v) {
-            const Sums more = get(ahead.get() + index(i) * width + o);
+            const Sums more = get(before[i] + o);
             for (int k = 0; k < 2; k++) v.v[k] = (v.v[k] + more.v[k] + 4) >> 3;
             activate(own(i) + o, v);
         };
         some.clear();
         for (int i = 0; i < n; i++) {
-            __builtin_prefetch(ahead.get() + (index(i) + 2) * width);
+            __builtin_prefetch(before[i] + 2 * width);
             if (!quiet(i))
                 some.push_back(i);
             else
@@ -387,9 +393,16 @@ class LevelCoder {
           luma({{0, width}}, 6, s.net.luma_bias), chroma({{0, width}}, 12, s.net.chroma_bias),
           sure_luma(s.net.luma_bits, 3, s.shifts[0], s.tables.certain),
           sure_chroma(s.net.chroma_bits, 6, s.shifts[1], s.tables.certain), inputs(3, w + 2, ZERO), rows(3, row),
-          ahead(new int16_t[size * width]), seen((h + 2) * pitch * 18 + FIVE, ZERO), busy((h + 2) * pitch + 8), dark(width), sums(w + 2),
-          high(w), coarse((w + 1) / 2) {
-        const size_t most = std::min(h, (w + 2) / 3);  // positions of a wave
+          most(std::min(h, (w + 2) / 3)), ahead(new int16_t[(int64_t)most * w * width]), spans(h),
+          seen((h + 2) * pitch * 18 + FIVE, ZERO), busy((h + 2) * pitch + 8), dark(width), sums(w + 2), high(w),
+          coarse((w + 1) / 2) {
+        for (int y = 0; y < h; y++) {
+            const uint8_t *coded = s.bands + (int64_t)y * w;
+            int from = 0, end = w;
+            while (from < w && !coded[from]) from++;
+            while (end > from && !coded[end - 1]) end--;
+            spans[y] = {from, end};
+        }
         z.resize(most * width), mixed.resize(most * width), features.resize(most * 6), found.resize(most * 9);
         lit.resize(most);
         for (int v = 0; v <= FAR; v++) squash[v] = (int16_t)squashed(v, 1);
@@ -402,12 +415,14 @@ class LevelCoder {
 
     // Codes the level.
     Wrong run() {
-        if (const Wrong wrong = look_ahead()) return wrong;
+        int ready = 0;
         for (at = 0; at < w + 3 * (h - 1); at++) {
-            if (stopped(h + at)) return STOPPED;
-            ys.clear();
+            if (at % 16 == 0 && s.watch && s.watch(ready + at, h + w + 3 * (h - 1))) return STOPPED;
+            for (; ready < h && 3 * ready <= at; ready++) look_ahead(ready);
+            ys.clear(), before.clear();
             for (int y = std::max((at - w + 3) / 3, 0); y <= std::min(at / 3, h - 1); y++)
-                if (s.bands[(int64_t)y * w + at - 3 * y]) ys.push_back(y);
+                if (const int x = at - 3 * y; s.bands[(int64_t)y * w + x])
+                    ys.push_back(y), before.push_back(ahead_of(y) + (int64_t)x * width);
             if (!ys.empty())
                 if (const Wrong wrong = wave()) return wrong;
         }
