@@ -171,6 +171,21 @@ def pointer(array: NDArray[Any]) -> int:
     return array.ctypes.data
 
 
+def rows_at(array: NDArray[Any], *inner: int) -> int:
+    """Address of an array of 32-bit numbers whose rows may lie apart, for a `c_void_p` field.
+
+    Args:
+        array: The array; the caller has to keep it alive.
+        inner: Bytes from an item to the next along each of the last axes.
+
+    Raises:
+        ValueError: Its rows are not contiguous.
+    """
+    if array.strides[-len(inner) :] != inner or array.itemsize != 4:
+        raise ValueError("the kernel takes contiguous rows only")
+    return array.ctypes.data
+
+
 def forward(
     net: Net,
     codes: NDArray[np.float32],
