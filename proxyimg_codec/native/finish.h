@@ -94,17 +94,29 @@ inline void together(const Together &s) {
     }
 }
 
+// A sample rounded to 0..most.
+template <class Number> inline Number rounded(float v, float most) {
+    // Adding 3 * 2^22 rounds to a whole number, halves to even.
+    const float whole = std::clamp(v, 0.f, 1.f) * most + 12582912.f;
+    return (Number)(int32_t)(whole - 12582912.f);
+}
+
 // Rounds n premultiplied samples [n][channels] to 0..most, `out` [n][3], or [n][4] with straight alpha.
 template <class Number>
 void finished(const float *samples, int channels, int64_t n, int components, float most, Number *out) {
-    for (int64_t k = 0; k < n; k++, samples += channels, out += components) {
-        const float alpha = components == 4 ? std::max(samples[3], 1e-6f) : 1;
-        for (int c = 0; c < components; c++) {
-            const float v = c < 3 && components == 4 ? samples[c] / alpha : samples[c];
-            // Adding 3 * 2^22 rounds to a whole number, halves to even.
-            const float whole = std::clamp(v, 0.f, 1.f) * most + 12582912.f;
-            out[c] = (Number)(int32_t)(whole - 12582912.f);
+    if (components == 4) {
+        for (int64_t k = 0; k < n; k++, samples += channels, out += 4) {
+            const float alpha = std::max(samples[3], 1e-6f);
+            for (int c = 0; c < 4; c++) out[c] = rounded<Number>(c < 3 ? samples[c] / alpha : samples[c], most);
         }
+        return;
+    }
+    Number some[1024];  // all channels of some of the samples, which vectors round
+    for (int64_t k = 0; k < n;) {
+        const int count = (int)std::min<int64_t>(n - k, 1024 / channels);
+        for (int i = 0; i < count * channels; i++) some[i] = rounded<Number>(samples[k * channels + i], most);
+        for (int i = 0; i < count; i++, k++, out += 3)
+            for (int c = 0; c < 3; c++) out[c] = some[i * channels + c];
     }
 }
 

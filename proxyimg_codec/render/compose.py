@@ -124,7 +124,8 @@ def _tile(painters: Sequence[_Painter], box: Rectangle) -> Floats:
 
 def _together(painters: Sequence[_Painter], box: Rectangle) -> Floats | None:
     """Renders `_tile` if all layers show the same samples, as in a picture at rest; else None."""
-    shown, covers = [], []
+    shown: list[still.Still] = []
+    covers: list[NDArray[np.int32] | None] = []
     for painter in painters:
         covered = painter.covered(box) if painter.plain else None
         if covered is not None and not covered.any():
@@ -169,7 +170,8 @@ class _Painter:
         self.native = self._run is engines.run_native
         self._network = picture.network_of(layer)
         self._moved = moved
-        self._paths = outline(present_outline(picture, layer), view)
+        paths = outline(present_outline(picture, layer), view)
+        self._paths = None if paths is None else cover.Segments.of(paths)
         self._warp = Warp(layer.pose, layer.mesh, layer.sampling in (1, 2), budget)
         sx, sy = view.supersampling
         small = view.width * sx * view.height * sy <= SAMPLES_MAX

@@ -43,6 +43,8 @@ class _Made:
         """Yields windows, in whole blocks, that together lack nothing else of a window."""
         top, left = window.top >> BLOCK, window.left >> BLOCK
         blocks = self._blocks[top : -(-window.bottom >> BLOCK), left : -(-window.right >> BLOCK)]
+        if blocks.all():
+            return
         lacks, row, side = ~blocks, 0, 1 << BLOCK
         while row < len(lacks):
             end = row + 1
