@@ -181,7 +181,7 @@ class LevelCoder {
     std::vector<Activation> z, mixed;
     std::vector<int16_t> features;
     std::vector<uint8_t> lit;
-    std::vector<int32_t> dark;           // [width] what latents of luma that are 0 add
+    std::vector<int16_t> dark;           // [width] what latents of luma that are 0 add to activations, within +-256
     std::vector<Symbol> symbols;         // those that are not certain
     std::vector<int32_t> places;         // in `found` of their values
     std::vector<int32_t> sums;           // [w + 2] of three rows
@@ -296,7 +296,7 @@ class LevelCoder {
             if (!quiet(i))
                 some.push_back(i);
             else
-                for (int o = 0; o < width; o += Signed::UNIT) begin(i, o, {});
+                begin_quiet(before[i], own(i));
         }
         causal((int)some.size(), [&](int k) { return place(some[k]); }, [&](int k, int o, Sums v) {
             begin(some[k], o, scaled(v, s.net.causal_bits));
@@ -319,6 +319,14 @@ class LevelCoder {
         return NOTHING;
     }
 
+    // Activations of a position around which all latents are 0: (v + 4) >> 3, within the bounds of int16.
+    void begin_quiet(const int16_t *__restrict from, Activation *__restrict to) const {
+        for (int o = 0; o < width; o++) {
+            const int16_t v = (int16_t)((from[o] >> 3) + (from[o] >> 2 & 1));
+            to[o] = (Activation)std::clamp<int16_t>(v, 0, 255);
+        }
+    }
+
     // Adds what the luma of the n positions of a wave tells of their chroma.
     void add_luma(int n) {
         const auto add = [&](int i, int o, Sums v) {
@@ -327,13 +335,18 @@ class LevelCoder {
             activate(own(i) + o, v);
         };
         for (int i = 0; i < n; i++)
-            if (!lit[i])
-                for (int o = 0; o < width; o += Signed::UNIT) add(i, o, get(dark.data() + o));
+            if (!lit[i]) darken(own(i));
         const int count = (int)alive.size();
         for (int k = 0; k < count; k++) described(features.data() + 6 * k, alive[k], 3, 0);
         from_luma(count, [&](int k) { return features.data() + 6 * k; }, [&](int k, int o, Sums v) {
             add(alive[k], o, scaled(v, s.net.from_luma_bits));
         });
+    }
+
+    // Adds what luma that is 0 tells of a position: v + ((dark + 4) >> 3).
+    void darken(Activation *__restrict to) const {
+        const int16_t *more = dark.data();
+        for (int o = 0; o < width; o++) to[o] = (Activation)std::clamp<int16_t>((int16_t)(to[o] + more[o]), 0, 255);
     }
 
     // Two features each of the first `count` latents of a position, and `zero` more.
@@ -409,7 +422,9 @@ class LevelCoder {
         set_weights(s.net);
         const int16_t nothing[6] = {};
         from_luma(1, [&](int) { return nothing; }, [&](int, int o, Sums v) {
-            scaled(v, s.net.from_luma_bits).put(dark.data() + o);
+            v = scaled(v, s.net.from_luma_bits);
+            for (ints &x : v.v) x = (x + 4) >> 3;
+            put(dark.data() + o, v, -256, 256);
         });
     }
 
