@@ -29,27 +29,25 @@ Raster::Inputs Raster::inputs(int level, Window window) {
     return {high, low(level + 1, above)};
 }
 
-// Makes planes above a level, [rows][columns][3] of a window that holds the one that is asked for.
-Raster::Planes Raster::finer(int level, const Inputs &from, Window window, Window *under) const {
+// Makes a window of planes above a level, or of the samples that they give by the weights of `matrix`:
+// [rows][columns][3], with `line` numbers from a row to the next.
+void Raster::finer(int level, const Inputs &from, Window window, const float *matrix, float *out, int64_t line) const {
     const Shape coarser = grid.at(level + 1);
-    const Window above = window.halved().grown(AROUND, coarser);
-    *under = above.doubled(grid.at(level));
-    const std::vector<int32_t> high = cut(from.high, 9, coarser, above);
-    std::vector<float> part;  // unless the rows are whole
-    if (above.columns() < coarser.columns) part = cut(from.low, 1, coarser, above, 3);
-    const float *planes = part.empty() ? from.low + 3 * (int64_t)above.top * coarser.columns : part.data();
+    const Window above = window.halved().grown(AROUND, coarser), under = above.doubled(grid.at(level));
+    const Window at = window.inside(under);
     const Synthetic &w = weights.synthesis_of(level + 1);
     const float t = (float)(plan.step - STEP_ORIGIN) / 128;
     std::vector<float> gain(9), bias = w.first_bias;
-    Planes out(new float[3 * under->shape().size()]);
     for (int k = 0; k < 9; k++) gain[k] = (float)std::exp((double)(w.gain[k] + w.gain_by_step[k] * t));
     for (size_t i = 0; i < bias.size(); i++) bias[i] += w.first_by_step[i] * t;
+    const int64_t wide = coarser.columns, start = above.top * wide + above.left;
     const loops::Synthesis task = {w.linear.data(), w.first.data(), bias.data(), w.second.data(),
                                    w.second_bias.data(), w.third.data(), w.third_bias.data(), gain.data(),
-                                   weights.hidden, above.rows(), above.columns(), under->rows(), under->columns(),
-                                   planes, high.data(), out.get(), watch.function, watch.user};
+                                   weights.hidden, above.rows(), above.columns(), under.rows(), under.columns(),
+                                   from.low + 3 * start, from.high + start, matrix, out, 3 * wide, wide,
+                                   coarser.size(), line, at.top, at.bottom, at.left, at.right,
+                                   watch.function, watch.user};
     check_core(core().pyramid_synthesis(&task), plan.at);
-    return out;
 }
 
 // Planes [h][w][3] above a level, of which a window is made.
@@ -68,9 +66,8 @@ const float *Raster::low(int level, Window window) {
     for (const Window &part : own.made.lacking(window)) {
         const Inputs from = inputs(level, part);
         strips(part, [&](Window strip) {
-            Window under;
-            const Planes found = finer(level, from, strip, &under);
-            paste(found.get(), under.shape(), strip.inside(under), own.planes.data(), shape, strip, 1, 3);
+            float *out = own.planes.data() + 3 * (strip.top * (int64_t)shape.columns + strip.left);
+            finer(level, from, strip, nullptr, out, 3 * (int64_t)shape.columns);
         });
         own.made.add(part);
     }
@@ -106,30 +103,30 @@ std::vector<float> Raster::matrix(int level) const {
     return out;
 }
 
-// Samples of a window, whose planes begin at `planes`, in rows of `stride` numbers.
-void Raster::colour(const std::vector<float> &matrix, const float *planes, int64_t stride, float *out, Shape shape,
-                    Window at) const {
-    std::vector<float> row(plan.components == 1 ? 3 * (size_t)at.columns() : 0);  // whose mean is grey
-    for (int y = at.top; y < at.bottom; y++, planes += stride) {
-        float *to = out + ((int64_t)y * shape.columns + at.left) * plan.components;
+// Samples of a window, whose planes begin at `planes`, both in rows of so many numbers.
+void Raster::colour(const std::vector<float> &matrix, const float *planes, int64_t stride, float *out, int64_t line,
+                    Shape at) const {
+    std::vector<float> row(plan.components == 1 ? 3 * (size_t)at.columns : 0);  // whose mean is grey
+    for (int y = 0; y < at.rows; y++, planes += stride, out += line) {
         if (row.empty()) {
-            core().shown(planes, matrix.data(), at.columns(), to);
+            core().shown(planes, matrix.data(), at.columns, out);
             continue;
         }
-        core().coloured(planes, matrix.data(), at.columns(), row.data());
-        for (int x = 0; x < at.columns(); x++)
-            to[x] = std::clamp((row[3 * x] + row[3 * x + 1] + row[3 * x + 2]) / 3 / 255, 0.f, 1.f);
+        core().coloured(planes, matrix.data(), at.columns, row.data());
+        for (int x = 0; x < at.columns; x++)
+            out[x] = std::clamp((row[3 * x] + row[3 * x + 1] + row[3 * x + 2]) / 3 / 255, 0.f, 1.f);
     }
 }
 
 // Makes a strip of samples of the whole raster from what the level above gives.
 void Raster::draw(const std::vector<float> &weights, const Inputs &from, Window strip) {
-    const Shape wanted = shape(0);
-    Window under;
-    const Planes found = finer(0, from, strip, &under);
-    const Window at = strip.inside(under);
-    const int64_t stride = 3 * (int64_t)under.columns();
-    colour(weights, found.get() + at.top * stride + 3 * at.left, stride, coloured[0].planes.data(), wanted, strip);
+    const int64_t line = (int64_t)plan.width * plan.components;
+    float *out = coloured[0].planes.data() + strip.top * line + strip.left * plan.components;
+    if (plan.components == 3) return finer(0, from, strip, weights.data(), out, line);
+    const int64_t stride = 3 * (int64_t)strip.columns();
+    const std::unique_ptr<float[]> planes(new float[strip.rows() * stride]);
+    finer(0, from, strip, nullptr, planes.get(), stride);
+    colour(weights, planes.get(), stride, out, line, strip.shape());
 }
 
 #ifndef PXI_NO_THREADS
@@ -160,9 +157,9 @@ const float *Raster::samples(int level, Window window) {
     const std::vector<float> weights = matrix(level);
     for (const Window &part : own.made.lacking(window)) {
         if (level) {
-            const float *planes = low(level, part);
-            const int64_t stride = 3 * (int64_t)wanted.columns;
-            colour(weights, planes + part.top * stride + 3 * part.left, stride, own.planes.data(), wanted, part);
+            const int64_t line = (int64_t)wanted.columns * plan.components, stride = 3 * (int64_t)wanted.columns;
+            colour(weights, low(level, part) + part.top * stride + 3 * part.left, stride,
+                   own.planes.data() + part.top * line + part.left * plan.components, line, part.shape());
 #ifndef PXI_NO_THREADS
         } else if (watch.threads > 1 && latents.flows(1)) {
             flow(weights, part);

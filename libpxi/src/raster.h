@@ -24,13 +24,12 @@ class Raster {
         const float *low;
     };
     Inputs inputs(int level, Window window);
-    typedef std::unique_ptr<float[]> Planes;  // [h][w][3]
-    Planes finer(int level, const Inputs &from, Window window, Window *under) const;
+    void finer(int level, const Inputs &from, Window window, const float *matrix, float *out, int64_t line) const;
     const float *low(int level, Window window);
     template <class Make> void strips(Window part, Make make) const;
     std::vector<float> matrix(int level) const;
-    void colour(const std::vector<float> &matrix, const float *planes, int64_t stride, float *out, Shape shape,
-                Window at) const;
+    void colour(const std::vector<float> &matrix, const float *planes, int64_t stride, float *out, int64_t line,
+                Shape at) const;
     void draw(const std::vector<float> &weights, const Inputs &from, Window strip);
     void flow(const std::vector<float> &weights, Window part);
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,6 +76,28 @@ def flatten(path: Ints) -> tuple[Ints, Ints]:
     return _chords(p, _log2_chords(p))
 
 
+class Segments(NamedTuple):
+    """Segments of paths, of which the coverage of several rectangles is computed.
+
+    Attributes:
+        points: int64 [m, 4, 2] control points in 1/256 output pixel.
+        log2: [m] base-2 logarithm of the number of chords of each.
+        low: [m, 2] least coordinates of the control points.
+        high: [m, 2] greatest coordinates.
+    """
+
+    points: Ints
+    log2: Ints
+    low: Ints
+    high: Ints
+
+    @classmethod
+    def of(cls, paths: Sequence[Ints]) -> Segments:
+        """Segments of closed paths, as for `coverage`."""
+        points = np.concatenate([np.zeros((0, 4, 2), np.int64), *map(_segments, paths)])
+        return cls(points, _log2_chords(points), points.min(1), points.max(1))
+
+
 def _segments(path: Ints) -> Ints:
     """Control points [m, 4, 2] of the segments of a path [3 m, 2]."""
     return np.stack([path[0::3], path[1::3], path[2::3], np.roll(path[0::3], -1, 0)], 1)
@@ -106,7 +129,7 @@ def _chords(p: Ints, k: Ints) -> tuple[Ints, Ints]:
 
 
 def coverage(
-    paths: Sequence[Ints],
+    paths: Sequence[Ints] | Segments,
     x0: int,
     y0: int,
     width: int,
@@ -116,7 +139,8 @@ def coverage(
     """Computes the coverage of a rectangle of output pixels.
 
     Args:
-        paths: Closed paths, int64 [3 m, 2] each, in 1/256 output pixel, as `to_output` makes them.
+        paths: Closed paths, int64 [3 m, 2] each, in 1/256 output pixel, as `to_output` makes them;
+            or their segments.
         x0: First column of the rectangle.
         y0: First row of the rectangle.
         width: Number of columns.
@@ -130,13 +154,14 @@ def coverage(
         LimitError: There are too many edges or pieces.
     """
     budget = budget or Budget()
+    found = paths if isinstance(paths, Segments) else Segments.of(paths)
     corner = np.array([x0 * ONE, y0 * ONE])
-    segments = np.concatenate([np.zeros((0, 4, 2), np.int64), *map(_segments, paths)]) - corner
     # Segments above, below or to the right of the rectangle have no effect on it.
-    low, high = segments.min(1), segments.max(1)
+    low, high = found.low - corner, found.high - corner
     near = (high[:, 1] > 0) & (low[:, 1] < height * ONE) & (low[:, 0] < width * ONE)
-    segments = segments[near]
-    log2 = _log2_chords(segments)
+    if not near.any():
+        return np.zeros((height, width), np.int32)
+    segments, log2 = found.points[near] - corner, found.log2[near]
     if kernel.available():
         budget.spend("work", int((1 << log2).sum()))
         out, work = kernel.coverage(segments, log2, width, height, budget.left("work"))

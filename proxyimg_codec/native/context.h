@@ -29,8 +29,8 @@ struct Level {
     const uint8_t *bands;    // [height][width], bit b set where band b is coded
     const int32_t *given;    // [9][height][width] to encode, or null to decode
     int32_t *latents;        // [9][height][width], 0
-    // Hears of progress, and stops the work by a 1; or null. Rows are looked ahead first: position (y, x) is coded
-    // when more than height + x + 3 y is done.
+    // Hears of progress, and stops the work by a 1; or null. Position (y, x) is coded when more than
+    // t + min(height, t / 3 + 1) is done, t = x + 3 y.
     int (*watch)(void *listener, int done, int all);
     void *listener;
 };
@@ -168,17 +168,21 @@ class LevelCoder {
     int16_t squash[FAR + 1];
     Window<Activation, PLANES> inputs;
     Rows<Activation> rows;               // of activations, [w + 2][width]
-    const std::unique_ptr<int16_t[]> ahead;  // [h][w][width]
+    const int most;                      // positions of a wave, and rows that it reaches
+    const std::unique_ptr<int16_t[]> ahead;  // [most][w][width], row y in place of row y - most
+    std::vector<std::pair<int, int>> spans;  // [h] from where to where anything is coded
     std::vector<Activation> seen;        // [h + 2][pitch][18]
     std::vector<uint8_t> busy;           // [h + 2][pitch] whether a latent is not 0
-    // Of a wave: positions (ys[i], wave - 3 ys[i]), activations [width], features, latents [9], whether
-    // one of these is not 0, and lists of positions: some to work on, and those with such latents.
+    // Of a wave: positions (ys[i], wave - 3 ys[i]), their places in `ahead`, activations [width], features,
+    // latents [9], whether one of these is not 0, and lists of positions: some to work on, and those with
+    // such latents.
     int at;
     std::vector<int32_t> ys, found, some, alive;
+    std::vector<const int16_t *> before;
     std::vector<Activation> z, mixed;
     std::vector<int16_t> features;
     std::vector<uint8_t> lit;
-    std::vector<int32_t> dark;           // [width] what latents of luma that are 0 add
+    std::vector<int16_t> dark;           // [width] what latents of luma that are 0 add to activations, within +-256
     std::vector<Symbol> symbols;         // those that are not certain
     std::vector<int32_t> places;         // in `found` of their values
     std::vector<int32_t> sums;           // [w + 2] of three rows
@@ -193,6 +197,7 @@ class LevelCoder {
     }
     int16_t feature(int v) const { return v < 0 ? -squash[std::min(-v, FAR)] : squash[std::min(v, FAR)]; }
     int16_t log_feature(int v) const { return (int16_t)s.logs[std::min<int64_t>(std::abs(v), s.n_logs - 1)]; }
+    int16_t *ahead_of(int y) const { return ahead.get() + (int64_t)(y % most) * w * width; }
     int64_t index(int i) const { return (int64_t)ys[i] * w + at - 3 * ys[i]; }
     Activation *own(int i) { return z.data() + (int64_t)i * width; }
     int64_t padded(int i) const { return (ys[i] + 2) * pitch + at - 3 * ys[i] + 2; }
@@ -249,33 +254,32 @@ class LevelCoder {
         }
     }
 
-    // Tells what is done, now and then; whether to stop.
-    bool stopped(int done) const {
-        return s.watch && done % 16 == 0 && s.watch(s.listener, done, h + w + 3 * (h - 1));
-    }
-
-    // What does not depend on the level itself.
-    Wrong look_ahead() {
-        read(0);
-        for (int y = 0; y <= h; y++) {
-            if (stopped(y)) return STOPPED;
-            inputs.up();
-            rows.up();
-            Activation *last = rows[2];
-            read(y + 1);
-            if (y < h)
-                inputs(first, first_planes, w, [&](int x, int o, Sums v) {
-                    activate(last + (int64_t)(x + 1) * width + o, scaled(v, s.net.first_bits));
-                });
-            else
-                std::fill_n(last, row, (Activation)0);
-            if (y == 0) continue;
-            int16_t *to = ahead.get() + (int64_t)(y - 1) * w * width;
-            second(w, [&](int x) { return rows[0] + (int64_t)x * width; }, [&](int x, int o, Sums v) {
-                put(to + (int64_t)x * width + o, scaled(v, s.net.second_bits), -32768, 32767);
-            });
+    // The next row of the first layer, where something is coded at it or beside it.
+    void hide(int y) {
+        inputs.up(), rows.up();
+        read(y + 1);
+        Activation *to = rows[2];
+        if (y >= h) {
+            std::fill_n(to, row, (Activation)0);
+            return;
         }
-        return NOTHING;
+        int from = w, end = 0;
+        for (int k = std::max(y - 1, 0); k < std::min(y + 2, h); k++)
+            from = std::min(from, spans[k].first), end = std::max(end, spans[k].second);
+        inputs(first, first_planes, std::max(from - 1, 0), std::min(end + 1, w), [&](int x, int o, Sums v) {
+            activate(to + (int64_t)(x + 1) * width + o, scaled(v, s.net.first_bits));
+        });
+    }
+    // What does not depend on the level itself, of the next row.
+    void look_ahead(int y) {
+        if (y == 0) read(0), hide(0);
+        hide(y + 1);
+        const auto [from, end] = spans[y];
+        const Activation *above = rows[0] + (int64_t)from * width;
+        int16_t *to = ahead_of(y) + (int64_t)from * width;
+        second(end - from, [&](int k) { return above + (int64_t)k * width; }, [&](int k, int o, Sums v) {
+            put(to + (int64_t)k * width + o, scaled(v, s.net.second_bits), -32768, 32767);
+        });
     }
 
     // Codes the positions of a wave.
@@ -283,17 +287,17 @@ class LevelCoder {
         const int n = (int)ys.size();
         const auto mine = [&](int i) { return own(i); };
         const auto begin = [&](int i, int o, Sums v) {
-            const Sums more = get(ahead.get() + index(i) * width + o);
+            const Sums more = get(before[i] + o);
             for (int k = 0; k < 2; k++) v.v[k] = (v.v[k] + more.v[k] + 4) >> 3;
             activate(own(i) + o, v);
         };
         some.clear();
         for (int i = 0; i < n; i++) {
-            __builtin_prefetch(ahead.get() + (index(i) + 2) * width);
+            __builtin_prefetch(before[i] + 2 * width);
             if (!quiet(i))
                 some.push_back(i);
             else
-                for (int o = 0; o < width; o += Signed::UNIT) begin(i, o, {});
+                begin_quiet(before[i], own(i));
         }
         causal((int)some.size(), [&](int k) { return place(some[k]); }, [&](int k, int o, Sums v) {
             begin(some[k], o, scaled(v, s.net.causal_bits));
@@ -316,6 +320,14 @@ class LevelCoder {
         return NOTHING;
     }
 
+    // Activations of a position around which all latents are 0: (v + 4) >> 3, within the bounds of int16.
+    void begin_quiet(const int16_t *__restrict from, Activation *__restrict to) const {
+        for (int o = 0; o < width; o++) {
+            const int16_t v = (int16_t)((from[o] >> 3) + (from[o] >> 2 & 1));
+            to[o] = (Activation)std::clamp<int16_t>(v, 0, 255);
+        }
+    }
+
     // Adds what the luma of the n positions of a wave tells of their chroma.
     void add_luma(int n) {
         const auto add = [&](int i, int o, Sums v) {
@@ -324,13 +336,18 @@ class LevelCoder {
             activate(own(i) + o, v);
         };
         for (int i = 0; i < n; i++)
-            if (!lit[i])
-                for (int o = 0; o < width; o += Signed::UNIT) add(i, o, get(dark.data() + o));
+            if (!lit[i]) darken(own(i));
         const int count = (int)alive.size();
         for (int k = 0; k < count; k++) described(features.data() + 6 * k, alive[k], 3, 0);
         from_luma(count, [&](int k) { return features.data() + 6 * k; }, [&](int k, int o, Sums v) {
             add(alive[k], o, scaled(v, s.net.from_luma_bits));
         });
+    }
+
+    // Adds what luma that is 0 tells of a position: v + ((dark + 4) >> 3).
+    void darken(Activation *__restrict to) const {
+        const int16_t *more = dark.data();
+        for (int o = 0; o < width; o++) to[o] = (Activation)std::clamp<int16_t>((int16_t)(to[o] + more[o]), 0, 255);
     }
 
     // Two features each of the first `count` latents of a position, and `zero` more.
@@ -390,27 +407,38 @@ class LevelCoder {
           luma({{0, width}}, 6, s.net.luma_bias), chroma({{0, width}}, 12, s.net.chroma_bias),
           sure_luma(s.net.luma_bits, 3, s.shifts[0], s.tables.certain),
           sure_chroma(s.net.chroma_bits, 6, s.shifts[1], s.tables.certain), inputs(3, w + 2, ZERO), rows(3, row),
-          ahead(new int16_t[size * width]), seen((h + 2) * pitch * 18 + FIVE, ZERO), busy((h + 2) * pitch + 8), dark(width), sums(w + 2),
-          high(w), coarse((w + 1) / 2) {
-        const size_t most = std::min(h, (w + 2) / 3);  // positions of a wave
+          most(std::min(h, (w + 2) / 3)), ahead(new int16_t[(int64_t)most * w * width]), spans(h),
+          seen((h + 2) * pitch * 18 + FIVE, ZERO), busy((h + 2) * pitch + 8), dark(width), sums(w + 2), high(w),
+          coarse((w + 1) / 2) {
+        for (int y = 0; y < h; y++) {
+            const uint8_t *coded = s.bands + (int64_t)y * w;
+            int from = 0, end = w;
+            while (from < w && !coded[from]) from++;
+            while (end > from && !coded[end - 1]) end--;
+            spans[y] = {from, end};
+        }
         z.resize(most * width), mixed.resize(most * width), features.resize(most * 6), found.resize(most * 9);
         lit.resize(most);
         for (int v = 0; v <= FAR; v++) squash[v] = (int16_t)squashed(v, 1);
         set_weights(s.net);
         const int16_t nothing[6] = {};
         from_luma(1, [&](int) { return nothing; }, [&](int, int o, Sums v) {
-            scaled(v, s.net.from_luma_bits).put(dark.data() + o);
+            v = scaled(v, s.net.from_luma_bits);
+            for (ints &x : v.v) x = (x + 4) >> 3;
+            put(dark.data() + o, v, -256, 256);
         });
     }
 
     // Codes the level.
     Wrong run() {
-        if (const Wrong wrong = look_ahead()) return wrong;
+        int ready = 0;
         for (at = 0; at < w + 3 * (h - 1); at++) {
-            if (stopped(h + at)) return STOPPED;
-            ys.clear();
+            if (at % 16 == 0 && s.watch && s.watch(s.listener, ready + at, h + w + 3 * (h - 1))) return STOPPED;
+            for (; ready < h && 3 * ready <= at; ready++) look_ahead(ready);
+            ys.clear(), before.clear();
             for (int y = std::max((at - w + 3) / 3, 0); y <= std::min(at / 3, h - 1); y++)
-                if (s.bands[(int64_t)y * w + at - 3 * y]) ys.push_back(y);
+                if (const int x = at - 3 * y; s.bands[(int64_t)y * w + x])
+                    ys.push_back(y), before.push_back(ahead_of(y) + (int64_t)x * width);
             if (!ys.empty())
                 if (const Wrong wrong = wave()) return wrong;
         }

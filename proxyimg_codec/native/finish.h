@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <vector>
 
 #include "level.h"
 
@@ -50,17 +51,72 @@ inline void painted(const Still &s) {
     }
 }
 
+struct Together {  // layers that show the same samples at points of a rectangle
+    const float *samples;            // [..][stride][channels] of a raster
+    const int64_t *rows, *columns;   // of the raster, of each row and column of points
+    const int32_t *const *covers;    // [layers][height][width] 0..full, front to back; or null where all is covered
+    float *out;                      // [height][width][4]
+    int64_t stride, height, width;
+    int32_t channels, layers, full;  // channels: 1 or 3
+};
+
+// Composites layers that show the same samples, clamped as in `premultiplied`, and summed as in `blend`.
+inline void together(const Together &s) {
+    const int64_t w = s.width, second = s.channels == 3;
+    std::vector<float> clear(w), colour[4], sum[4];
+    for (int c = 0; c < 4; c++) colour[c].assign(w, 1), sum[c].resize(w);
+    for (int64_t y = 0; y < s.height; y++) {
+        const float *line = s.samples + s.rows[y] * s.stride * s.channels;
+        for (int64_t x = 0; x < w; x++)
+            for (int c = 0; c < 3; c++) {
+                const float v = line[s.columns[x] * s.channels + c * second];
+                colour[c][x] = v > 0 ? v < 1 ? v : 1 : 0;
+            }
+        std::fill(clear.begin(), clear.end(), 1.f);
+        for (std::vector<float> &to : sum) std::fill(to.begin(), to.end(), 0.f);
+        for (int layer = 0; layer < s.layers; layer++) {
+            const int32_t *cover = s.covers[layer] ? s.covers[layer] + y * w : nullptr;
+            if (cover && !std::any_of(cover, cover + w, [](int32_t v) { return v; })) continue;
+            const float unit = 1.f / (float)s.full;
+            for (int c = 0; c < 4; c++) {
+                float *to = sum[c].data();
+                const float *from = colour[c].data(), *left = clear.data();
+                if (cover)
+                    for (int64_t x = 0; x < w; x++) to[x] += left[x] * ((float)cover[x] * unit) * from[x];
+                else
+                    for (int64_t x = 0; x < w; x++) to[x] += left[x] * from[x];
+            }
+            for (int64_t x = 0; x < w; x++) clear[x] *= cover ? 1 - (float)cover[x] * unit : 0;
+        }
+        float *to = s.out + 4 * y * w;
+        for (int64_t x = 0; x < w; x++)
+            for (int c = 0; c < 4; c++) *to++ = sum[c][x];
+    }
+}
+
+// A sample rounded to 0..most.
+template <class Number> inline Number rounded(float v, float most) {
+    // Adding 3 * 2^22 rounds to a whole number, halves to even.
+    const float whole = std::clamp(v, 0.f, 1.f) * most + 12582912.f;
+    return (Number)(int32_t)(whole - 12582912.f);
+}
+
 // Rounds n premultiplied samples [n][channels] to 0..most, `out` [n][3], or [n][4] with straight alpha.
 template <class Number>
 void finished(const float *samples, int channels, int64_t n, int components, float most, Number *out) {
-    for (int64_t k = 0; k < n; k++, samples += channels, out += components) {
-        const float alpha = components == 4 ? std::max(samples[3], 1e-6f) : 1;
-        for (int c = 0; c < components; c++) {
-            const float v = c < 3 && components == 4 ? samples[c] / alpha : samples[c];
-            // Adding 3 * 2^22 rounds to a whole number, halves to even.
-            const float whole = std::clamp(v, 0.f, 1.f) * most + 12582912.f;
-            out[c] = (Number)(int32_t)(whole - 12582912.f);
+    if (components == 4) {
+        for (int64_t k = 0; k < n; k++, samples += channels, out += 4) {
+            const float alpha = std::max(samples[3], 1e-6f);
+            for (int c = 0; c < 4; c++) out[c] = rounded<Number>(c < 3 ? samples[c] / alpha : samples[c], most);
         }
+        return;
+    }
+    Number some[1024];  // all channels of some of the samples, which vectors round
+    for (int64_t k = 0; k < n;) {
+        const int count = (int)std::min<int64_t>(n - k, 1024 / channels);
+        for (int i = 0; i < count * channels; i++) some[i] = rounded<Number>(samples[k * channels + i], most);
+        for (int i = 0; i < count; i++, k++, out += 3)
+            for (int c = 0; c < 3; c++) out[c] = some[i * channels + c];
     }
 }
 

@@ -132,6 +132,14 @@ void PXI(premultiplied)(const float *output, int32_t channels, int64_t n, float 
 // Colours of points that lie on samples; see `painted`.
 void PXI(painted)(const Still *points) { painted(*points); }
 
+// Layers that show the same samples; see `together`.
+int PXI(together)(const Together *layers) {
+    return guarded([&] {
+        together(*layers);
+        return NOTHING;
+    });
+}
+
 // Output samples of `bits` 8 or 16; see `finished`.
 void PXI(finished)(const float *samples, int32_t channels, int64_t n, int32_t components, int32_t bits, void *out) {
     if (bits == 8)

@@ -89,6 +89,7 @@ _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "pxi_blend": (None, [*(_ADDRESS,) * 4, _LONG]),
     "pxi_premultiplied": (None, [_ADDRESS, _INT, _LONG, _ADDRESS]),
     "pxi_painted": (None, [_ADDRESS]),
+    "pxi_together": (ct.c_int, [_ADDRESS]),
     "pxi_finished": (None, [_ADDRESS, _INT, _LONG, _INT, _INT, _ADDRESS]),
     "pxi_refine": (ct.c_int, [_ADDRESS]),
     "pxi_refine_slopes": (ct.c_int, [_ADDRESS]),
@@ -167,6 +168,21 @@ def pointer(array: NDArray[Any]) -> int:
     """
     if not array.flags.c_contiguous:
         raise ValueError("the kernel takes contiguous arrays only")
+    return array.ctypes.data
+
+
+def rows_at(array: NDArray[Any], *inner: int) -> int:
+    """Address of an array of 32-bit numbers whose rows may lie apart, for a `c_void_p` field.
+
+    Args:
+        array: The array; the caller has to keep it alive.
+        inner: Bytes from an item to the next along each of the last axes.
+
+    Raises:
+        ValueError: Its rows are not contiguous.
+    """
+    if array.strides[-len(inner) :] != inner or array.itemsize != 4:
+        raise ValueError("the kernel takes contiguous rows only")
     return array.ctypes.data
 
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
+#include <cstring>
 #include <vector>
 
 #include "level.h"
@@ -59,9 +60,8 @@ struct LatentCoder {
             if (s.row < 0) continue;
             const uint16_t *ends = t.ends + (int64_t)s.row * t.columns;
             const uint32_t state = source.states[lane];
-            const uint16_t slot = (uint16_t)(state & mask);
-            uint16_t found = 0;
-            for (int i = 1; i < t.columns; i++) found += ends[i] <= slot;
+            const uint32_t slot = state & mask;
+            const int found = passed(ends + 1, 2 * (int)t.reach[s.row] + 1, (int16_t)slot);
             const uint32_t freq = ends[found + 1] - ends[found];
             if (!advance(lane, freq * (state >> t.scale_bits) + slot - ends[found])) return STREAM_ENDS;
             s.value = found;
@@ -106,6 +106,23 @@ struct LatentCoder {
     }
 
   private:
+    // How many of the first `count` ends do not exceed a slot. Those behind them exceed every slot: so all are
+    // compared that a few vectors hold.
+    static int passed(const uint16_t *ends, int count, int16_t slot) {
+        typedef int16_t sixteen __attribute__((vector_size(32)));
+        typedef int8_t bytes __attribute__((vector_size(16)));
+        const uint64_t ones = ~(uint64_t)0 / 255;
+        int found = 0;
+        for (int i = 0; i < count; i += 16) {
+            sixteen v;
+            std::memcpy(&v, ends + i, sizeof v);
+            const bytes below = __builtin_convertvector(v <= slot, bytes);
+            uint64_t parts[2];
+            std::memcpy(parts, &below, sizeof below);
+            found += (int)((((parts[0] & ones) + (parts[1] & ones)) * ones) >> 56);
+        }
+        return found;
+    }
     // A new state of a lane, which is refilled where it ran low; false where the stream ends.
     bool advance(int &lane, uint32_t state) {
         if (state < 65536) {

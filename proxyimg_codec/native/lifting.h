@@ -27,24 +27,30 @@ inline int mirrored(int i, int size, bool high) {
 }
 
 class Lifting {
+    static constexpr int TAPS = 5;
+
     const Plain &s;
     const int w;
     std::vector<int32_t> sides[2], halves[2];  // rows of bands [w + 4], and of half of the samples [w]
 
     // Row y of what two bands give; high ones are in units of 16.
-    void down(const int32_t *low, const int32_t *high, int low_shift, int y, int32_t *out) {
-        std::fill_n(out, w, 128);
+    void down(const int32_t *low, const int32_t *high, int low_shift, int y, int32_t *__restrict out) {
+        int32_t weights[2 * TAPS];
+        const int32_t *from[2 * TAPS];
         for (int kind = 0; kind < 2; kind++)
-            for (int tap = 0; tap < 5; tap++) {
-                const int weight = s.taps[10 * kind + 5 * (y % 2) + tap] * (1 << (kind ? 4 : low_shift));
-                if (!weight) continue;
-                const int32_t *from = (kind ? high : low) + (int64_t)mirrored(y / 2 - 2 + tap, s.rows, kind) * w;
-                for (int x = 0; x < w; x++) out[x] += weight * from[x];
+            for (int tap = 0; tap < TAPS; tap++) {
+                const int k = TAPS * kind + tap;
+                weights[k] = s.taps[2 * TAPS * kind + TAPS * (y % 2) + tap] * (1 << (kind ? 4 : low_shift));
+                from[k] = (kind ? high : low) + (int64_t)mirrored(y / 2 - 2 + tap, s.rows, kind) * w;
             }
-        for (int x = 0; x < w; x++) out[x] >>= 8;
+        for (int x = 0; x < w; x++) {
+            int32_t total = 128;
+            for (int k = 0; k < 2 * TAPS; k++) total += weights[k] * from[k][x];
+            out[x] = total >> 8;
+        }
     }
 
-    void across(int32_t *out) {
+    void across(int32_t *__restrict out) {
         for (int kind = 0; kind < 2; kind++) {
             int32_t *row = sides[kind].data() + 2;
             const int32_t before[2] = {row[mirrored(-2, s.columns, kind)], row[mirrored(-1, s.columns, kind)]};
@@ -52,16 +58,19 @@ class Lifting {
             for (int k = 0; k < 3; k++) after[k] = row[mirrored(w - 1 + k, s.columns, kind)];
             std::copy_n(before, 2, row - 2), std::copy_n(after, 3, row + w - 1);
         }
+        const int32_t most = s.most;
         for (int phase = 0; phase < 2; phase++) {
-            const int32_t *l = s.taps + 5 * phase, *h = l + 10, *low = sides[0].data(), *high = sides[1].data();
-            int32_t *to = halves[phase].data();
+            const int32_t *l = s.taps + TAPS * phase, *h = l + 2 * TAPS, *low = sides[0].data(), *high = sides[1].data();
+            int32_t *__restrict to = halves[phase].data();
             for (int x = 0; x < w; x++) {
                 int32_t total = 128;
-                for (int tap = 0; tap < 5; tap++) total += l[tap] * low[x + tap] + h[tap] * high[x + tap];
-                to[x] = std::clamp(total >> 8, -s.most, s.most);
+                for (int tap = 0; tap < TAPS; tap++) total += l[tap] * low[x + tap] + h[tap] * high[x + tap];
+                to[x] = std::clamp(total >> 8, -most, most);
             }
         }
-        for (int x = 0; x < s.columns; x++) out[x] = halves[x % 2][x / 2];
+        const int32_t *even = halves[0].data(), *odd = halves[1].data();
+        for (int x = 0; x < s.columns / 2; x++) out[2 * x] = even[x], out[2 * x + 1] = odd[x];
+        if (s.columns % 2) out[s.columns - 1] = even[s.columns / 2];
     }
 
   public:

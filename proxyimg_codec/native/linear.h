@@ -76,49 +76,55 @@ template <class Vector, int V> struct Vectors {
     }
 };
 
-// A layer whose inputs lie in a few stretches of memory around each position. Outputs are computed
-// V vectors at a time, for TILE positions.
-template <class Kind, int V> class Linear {
+// What layers have in common: outputs are computed V vectors at a time, for SIDE positions.
+template <class Layer, class Input, class Vector, int V, int SIDE> struct InTiles {
+    typedef Input Number;
+    typedef Vectors<Vector, V> Sums;
+    static constexpr int UNIT = V * LANES;
+    const int blocks;
+
+    static int padded(int n) { return (n + UNIT - 1) / UNIT * UNIT; }
+    explicit InTiles(int outputs) : blocks(padded(outputs) / UNIT) {}
+    int outputs() const { return blocks * UNIT; }
+
+    // Calls out(i, first output, Sums) for each place in(i), i < n.
+    template <class In, class Out> void operator()(int n, In in, Out out) const {
+        for (int i = 0; i < n; i += SIDE) {
+            const Number *from[SIDE];
+            for (int p = 0; p < SIDE; p++) from[p] = in(std::min(i + p, n - 1));
+            for (int block = 0; block < blocks; block++) {
+                Sums sums[SIDE];
+                ((const Layer *)this)->products(block, from, sums);
+                for (int p = 0; p < std::min(SIDE, n - i); p++) out(i + p, block * UNIT, sums[p]);
+            }
+        }
+    }
+};
+
+// A layer whose inputs lie in a few stretches of memory around each position.
+template <class Kind, int V>
+class Linear : public InTiles<Linear<Kind, V>, typename Kind::Number, typename Kind::Vector, V, TILE> {
+    typedef InTiles<Linear<Kind, V>, typename Kind::Number, typename Kind::Vector, V, TILE> Base;
     typedef typename Kind::Number Number;
     typedef typename Kind::Sum Sum;
     std::vector<Stretch> stretches;
-    int steps = 0, blocks;
+    int steps = 0;
 
   public:
-    static constexpr int UNIT = V * LANES;
-    typedef Vectors<typename Kind::Vector, V> Sums;
-    static int padded(int n) { return (n + UNIT - 1) / UNIT * UNIT; }
+    using typename Base::Sums;
+    using Base::blocks, Base::UNIT;
 
-    Linear(std::vector<Stretch> from, int n, const Sum *bias_, Sum more = 0)
-        : stretches(std::move(from)), blocks(padded(n) / UNIT) {
+    Linear(std::vector<Stretch> from, int n, const Sum *bias_, Sum more = 0) : Base(n), stretches(std::move(from)) {
         for (const Stretch &s : stretches) steps += s.count / Kind::PER_STEP;
         weights.resize((size_t)blocks * steps), bias.resize(blocks);
         for (int o = 0; o < n; o++) ((Sum *)bias.data())[o] = (bias_ ? bias_[o] : 0) + more;
     }
-    int outputs() const { return blocks * UNIT; }
     void set(int input, int output, Sum weight, Sum zero = 0) {  // zero: the input that adds nothing
         ((Sum *)bias.data())[output] -= weight * zero;
         Sums &at = weights[(size_t)(output / UNIT) * steps + input / Kind::PER_STEP];
         ((Number *)&at)[output % UNIT * Kind::PER_STEP + input % Kind::PER_STEP] = (Number)weight;
     }
-
     void ready() {}  // to be called when all weights are set
-
-    // Calls out(i, first output, Sums) for each place in(i), i < n.
-    template <class In, class Out> void operator()(int n, In in, Out out) const {
-        for (int i = 0; i < n; i += TILE) {
-            const Number *from[TILE];
-            for (int p = 0; p < TILE; p++) from[p] = in(std::min(i + p, n - 1));
-            for (int block = 0; block < blocks; block++) {
-                Sums sums[TILE];
-                products(block, from, sums);
-                for (int p = 0; p < std::min(TILE, n - i); p++) out(i + p, block * UNIT, sums[p]);
-            }
-        }
-    }
-
-  private:
-    std::vector<Sums> weights, bias;  // [blocks][steps], [blocks]
 
     // Not inlined, so that all pointers stay in registers.
     __attribute__((noinline)) void products(int block, const Number *const *in, Sums *out) const {
@@ -145,6 +151,9 @@ template <class Kind, int V> class Linear {
 #pragma GCC unroll 8
         for (int p = 0; p < TILE; p++) out[p] = sums[p];
     }
+
+  private:
+    std::vector<Sums> weights, bias;  // [blocks][steps], [blocks]
 };
 
 }  // namespace PXI_LEVEL

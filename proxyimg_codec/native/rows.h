@@ -7,15 +7,10 @@
 #include <cstring>
 #include <vector>
 
-#include "level.h"
-#include "vectors.h"
+#include "sums.h"
 
 namespace PXI_LEVEL {
 
-typedef float near_vec __attribute__((vector_size(4 * LANES), aligned(4), may_alias));
-static inline vec load(const float *p) { return *(const near_vec *)p; }
-static inline void store(float *p, vec v) { *(near_vec *)p = v; }
-static inline vec all(float f) { return (vec){} + f; }
 static inline vec absolute(vec v) { return (vec)((ints)v & 0x7fffffff); }
 static inline vec chosen(ints mask, vec a, vec b) { return (vec)((mask & (ints)a) | (~mask & (ints)b)); }
 static inline vec least(vec a, vec b) { return a < b ? a : b; }
@@ -71,28 +66,12 @@ class Sum {
     static constexpr int OUTS = 4, WIDE = 3;  // fills 16 registers
     std::vector<float> weights, biases;       // [blocks][terms][OUTS], [blocks][OUTS]
 
-    // Not a part of what calls it, where one of the sums would find no register.
-    template <int V>
-    __attribute__((noinline)) static void add(const float *const *in, const float *w, int used, int x, const float *bias,
-                                              vec *out) {
-        vec acc[OUTS][V];
-        for (int o = 0; o < OUTS; o++)
-            for (int j = 0; j < V; j++) acc[o][j] = all(bias[o]);
-        for (int k = 0; k < used; k++, w += OUTS) {
-            vec v[V];
-            for (int j = 0; j < V; j++) v[j] = load(in[k] + x + j * LANES);
-            for (int o = 0; o < OUTS; o++) {
-                const vec factor = all(w[o]);
-                for (int j = 0; j < V; j++) acc[o][j] += v[j] * factor;
-            }
-        }
-        for (int o = 0; o < OUTS; o++)
-            for (int j = 0; j < V; j++) out[o * V + j] = acc[o][j];
-    }
     template <int V, class Out> void block(const float *const *in, int used, int x, Out &out) const {
         vec sums[OUTS * V];
         for (int b = 0; b < blocks; b++) {
-            add<V>(in, weights.data() + (size_t)b * terms * OUTS, used, x, biases.data() + b * OUTS, sums);
+            const float *const own = weights.data() + (size_t)b * terms * OUTS;
+            const auto term = [in, own](int k) { return Term{in[k], own + k * OUTS}; };
+            add_terms<OUTS, V>(term, used, x, biases.data() + b * OUTS, sums);
             for (int o = 0; o < OUTS && b * OUTS + o < outputs; o++)
                 for (int j = 0; j < V; j++) out(b * OUTS + o, x + j * LANES, sums[o * V + j]);
         }

@@ -56,13 +56,13 @@ template <class Number, int PLANES> struct Window {
         Number *to = planes[r];
         for (int x = 0; x < length; x++, from += 12, to += PLANES) std::copy_n(from, 3, to);
     }
-    // Calls out(x, first output, Sums) of a layer of all, or of one of planes, for n positions.
-    template <class L, class Out> void operator()(const L &of_all, const L &of_planes, int n, Out out) {
+    // Calls out(x, first output, Sums) of a layer of all, or of one of planes, for positions from .. end - 1.
+    template <class L, class Out> void operator()(const L &of_all, const L &of_planes, int from, int end, Out out) {
         std::fill(any.begin(), any.end(), 0);
         for (int r = 0; r < side; r++)
             for (int x = 0; x < length; x++) any[x] |= busy[r][x];
         int some = 0, none = 0;
-        for (int x = 0; x < n; x++) {
+        for (int x = from; x < end; x++) {
             uint8_t near = 0;
             for (int k = 0; k < side; k++) near |= any[x + k];
             loud[some] = quiet[none] = x;

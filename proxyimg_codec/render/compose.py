@@ -101,6 +101,8 @@ def compose(
 def _tile(painters: Sequence[_Painter], box: Rectangle) -> Floats:
     """Renders premultiplied samples [h, w, 4] of a rectangle `box` = x, y, w, h of samples."""
     _, _, w, h = box
+    if (shared := _together(painters, box)) is not None:
+        return shared
     result = np.zeros((h * w, 4), np.float32)
     clear = np.ones(h * w, np.float32)
     for painter in painters:
@@ -118,6 +120,30 @@ def _tile(painters: Sequence[_Painter], box: Rectangle) -> Floats:
         result[rows] += weight[:, None] * colour
         clear[rows] *= 1 - covered * colour[:, 3]
     return result.reshape(h, w, 4)
+
+
+def _together(painters: Sequence[_Painter], box: Rectangle) -> Floats | None:
+    """Renders `_tile` if all layers show the same samples, as in a picture at rest; else None."""
+    shown: list[still.Still] = []
+    covers: list[NDArray[np.int32] | None] = []
+    for painter in painters:
+        covered = painter.covered(box) if painter.plain else None
+        if covered is not None and not covered.any():
+            continue
+        found = painter.still(box) if painter.plain else None
+        if found is None or found.samples is not (shown or [found])[0].samples:
+            return None
+        shown.append(found)
+        covers.append(covered)
+    for own, covered in zip(shown, covers, strict=True):
+        # Beyond the ends of a layer's part, its last samples are repeated.
+        rows, columns = own.rows != shown[-1].rows, own.columns != shown[-1].columns
+        if covered is None:
+            if rows.any() or columns.any():
+                return None
+        elif covered[rows].any() or (columns.any() and covered[:, columns].any()):
+            return None
+    return still.together(shown[-1], covers) if shown else None
 
 
 def _is_solid(layer: Layer, moved: Moved) -> bool:
@@ -144,7 +170,8 @@ class _Painter:
         self.native = self._run is engines.run_native
         self._network = picture.network_of(layer)
         self._moved = moved
-        self._paths = outline(present_outline(picture, layer), view)
+        paths = outline(present_outline(picture, layer), view)
+        self._paths = None if paths is None else cover.Segments.of(paths)
         self._warp = Warp(layer.pose, layer.mesh, layer.sampling in (1, 2), budget)
         sx, sy = view.supersampling
         small = view.width * sx * view.height * sy <= SAMPLES_MAX
@@ -209,7 +236,8 @@ class _Painter:
         _, _, w, h = box
         if self._paths is None:
             return Sheet(None, 0, h * w)
-        covered = cover.coverage(self._paths, *box, self._budget)
+        covered = self.covered(box)
+        assert covered is not None, "there are paths"
         seen = np.flatnonzero(covered.max(1))  # faster than any(1)
         first, last = (int(seen[0]), int(seen[-1]) + 1) if len(seen) else (0, 0)
         share = covered[first:last].ravel().astype(np.float32) / np.float32(cover.FULL)
@@ -227,7 +255,7 @@ class _Painter:
 
     def paint(self, sheet: Sheet, box: Rectangle, at: NDArray[np.int64]) -> None:
         """Computes colours of samples of a sheet; `at` are their numbers, from `sheet.start` on."""
-        if (found := self._still(box)) is not None:
+        if (found := self.still(box)) is not None:
             still.paint(found, sheet, at)
             return
         colour = self._textured(box, at + sheet.start)
@@ -237,7 +265,17 @@ class _Painter:
             sheet.colour[at] = colour
         sheet.known[at] = True
 
-    def _still(self, box: Rectangle) -> still.Still | None:
+    @property
+    def plain(self) -> bool:
+        """Whether it paints samples as they are, all that are asked for."""
+        pose = self._layer.pose
+        return self._seen and not pose.colour and pose.opacity == OPACITY_MAX
+
+    def covered(self, box: Rectangle) -> NDArray[np.int32] | None:
+        """Coverage int32 [h, w] of a rectangle in 0..`cover.FULL`; None where all is covered."""
+        return None if self._paths is None else cover.coverage(self._paths, *box, self._budget)
+
+    def still(self, box: Rectangle) -> still.Still | None:
         """Samples that the points of a rectangle lie on; None if they are not that simple."""
         texture, (x, y, w, h) = self._layer.texture, box
         if not (self.native and isinstance(texture, PyramidTexture)) or self._window is None:

@@ -7,11 +7,14 @@ compiled kernel (`native/finish.h`); `compose` is the reference.
 from __future__ import annotations
 
 import ctypes as ct
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import LimitError
+from ..geometry import coverage as cover
 from ..native import kernel
 from ..texture import sampling
 from ..texture.grid import Window
@@ -89,3 +92,41 @@ def paint(still: Still, sheet: Sheet, at: NDArray[np.int64]) -> None:
         *map(kernel.pointer, arrays), stride, len(still.columns), sheet.start, len(at), channels
     )
     lib.pxi_painted(ct.byref(points))
+
+
+class _Together(ct.Structure):
+    """Mirrors `struct Together`."""
+
+    _fields_ = [
+        *((n, ct.c_void_p) for n in ("samples", "rows", "columns", "covers", "out")),
+        *((n, ct.c_int64) for n in ("stride", "height", "width")),
+        *((n, ct.c_int32) for n in ("channels", "layers", "full")),
+    ]
+
+
+def together(still: Still, covers: Sequence[NDArray[np.int32] | None]) -> Floats:
+    """Composites layers that show the same samples.
+
+    Args:
+        still: The samples.
+        covers: For each layer, front to back, int32 [h, w] coverage in 0..`cover.FULL`; None where
+            it covers all.
+
+    Returns:
+        float32 [h, w, 4] premultiplied colour and alpha.
+
+    Raises:
+        LimitError: The kernel cannot allocate what it needs.
+    """
+    lib = kernel.library()
+    assert lib is not None, "check available() first"
+    _, stride, channels = still.samples.shape
+    height, width = len(still.rows), len(still.columns)
+    out = np.empty((height, width, 4), np.float32)
+    addresses = [None if v is None else kernel.pointer(v) for v in covers]
+    arrays: list[Any] = [kernel.pointer(v) for v in still]
+    arrays += [ct.cast((ct.c_void_p * len(covers))(*addresses), ct.c_void_p), kernel.pointer(out)]
+    layers = _Together(*arrays, stride, height, width, channels, len(covers), cover.FULL)
+    if lib.pxi_together(ct.byref(layers)):
+        raise LimitError("there is not enough memory to draw the picture; ask for a smaller one")
+    return out

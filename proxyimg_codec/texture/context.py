@@ -332,7 +332,7 @@ class Place(NamedTuple):
         """Place of a tile, and the window that it has with what its context depends on."""
         outer = window.grown(REACH, self.bands.shape)
         bands = np.zeros(outer.shape, np.uint8)
-        bands[window.inside(outer)] = self.bands[window.at]
+        bands[window.inside(outer).at] = self.bands[window.at]
         low, parent = self.low[:, *outer.at], self.parent[:, *outer.halved().at]
         return Place(self.coder, low, parent, bands), outer
 

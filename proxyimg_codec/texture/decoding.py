@@ -43,6 +43,8 @@ class _Made:
         """Yields windows, in whole blocks, that together lack nothing else of a window."""
         top, left = window.top >> BLOCK, window.left >> BLOCK
         blocks = self._blocks[top : -(-window.bottom >> BLOCK), left : -(-window.right >> BLOCK)]
+        if blocks.all():
+            return
         lacks, row, side = ~blocks, 0, 1 << BLOCK
         while row < len(lacks):
             end = row + 1
@@ -118,8 +120,7 @@ class Decoding:
             made = self._made["samples", 0]
             for part in list(made.lacking(window)):
                 for strip in _strips(part):
-                    low = self._finer(0, strip)
-                    synthesis.put_samples(self._model, low, step, 0, out[strip.at])
+                    self._make(0, strip, out[strip.at])
                 made.add(part)
             if made.whole:
                 for key in [k for k in self._arrays if k[0] in ("latents", "plain", "bands")]:
@@ -271,7 +272,7 @@ class Decoding:
             coder.level(place, found)
             coder.finish(self._where)
         finally:
-            out[:, *tile.at] = found[:, *tile.inside(outer)]
+            out[:, *tile.at] = found[:, *tile.inside(outer).at]
 
     def _plain(self, level: int, window: Window) -> Ints:
         """Plain planes int32 [3, h, w] of a level, of which a window is made."""
@@ -287,7 +288,7 @@ class Decoding:
                 high = self._latents(level + 1, above)[:, *above.at]
                 under = above.doubled(grid.at(level))
                 found = next_plain(low, high, under.shape)
-                out[:, *strip.at] = found[:, *strip.inside(under)]
+                out[:, *strip.at] = found[:, *strip.inside(under).at]
                 worked(0)  # it takes little time, but enough to be asked to stop
             made.add(part)
         return out
@@ -301,19 +302,27 @@ class Decoding:
         made = self._made["low", level]
         for part in list(made.lacking(window)):
             for strip in _strips(part):
-                out[strip.at] = self._finer(level, strip)
+                self._make(level, strip, out[strip.at])
             made.add(part)
         return out
 
-    def _finer(self, level: int, window: Window) -> Floats:
-        """Makes a window of the planes above a level, float32 [rows, columns, 3]."""
+    def _make(self, level: int, window: Window, out: Floats) -> None:
+        """Makes a window of the planes above a level, or of the samples if that is 0.
+
+        Args:
+            level: Number of the level, from 0.
+            window: Rows and columns that are made.
+            out: float32 [rows, columns, 3 or components] array for them.
+        """
         grid = self._grid
         above = window.halved().grown(AROUND, grid.at(level + 1))
         under = above.doubled(grid.at(level))
         high = self._latents(level + 1, above)[:, *above.at]
         low = self._low(level + 1, above)[above.at]
-        out = synthesis.finer(self._model, level + 1, low, high, self._fields["step"], under.shape)
-        return out[window.inside(under)]
+        synthesis.finer(
+            self._model, level + 1, low, high, self._fields["step"], under.shape,
+            window.inside(under), out, shown=level == 0,
+        )  # fmt: skip
 
 
 def _strips(window: Window) -> Iterator[Window]:

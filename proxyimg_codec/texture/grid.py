@@ -65,12 +65,12 @@ class Window(NamedTuple):
             max(self.left, other.left), min(self.right, other.right),
         )  # fmt: skip
 
-    def inside(self, outer: Window) -> tuple[slice, slice]:
-        """Rows and columns of the window in an array of those of an outer one."""
-        return (
-            slice(self.top - outer.top, self.bottom - outer.top),
-            slice(self.left - outer.left, self.right - outer.left),
-        )
+    def inside(self, outer: Window) -> Window:
+        """Window in an array of those of an outer one."""
+        return Window(
+            self.top - outer.top, self.bottom - outer.top,
+            self.left - outer.left, self.right - outer.left,
+        )  # fmt: skip
 
     @property
     def at(self) -> tuple[slice, slice]:

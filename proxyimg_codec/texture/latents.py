@@ -60,7 +60,7 @@ def encode(
                     part, outer = here.tile(window)
                     own = Encoder()
                     coded = own.level(part, given[:, *outer.at])
-                    parent[:, *window.at] = coded[:, *window.inside(outer)]
+                    parent[:, *window.at] = coded[:, *window.inside(outer).at]
                     tiles.append(own.tile())
         else:
             parent = coder.level(here, given)

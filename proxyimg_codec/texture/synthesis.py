@@ -14,7 +14,7 @@ from ..progress import worked
 from . import synthesis_native
 from .context import Ints
 from .convolution import by_row, convolved, strips
-from .grid import BANDS, mirrored_indices
+from .grid import BANDS, Window, mirrored_indices
 from .network import Floats
 from .registered_model import STEP_ORIGIN, Model, Synthesis
 
@@ -61,8 +61,9 @@ def _planes(colour: int) -> list[tuple[int, tuple[int, int]]]:
 
 
 def finer(
-    model: Model, level: int, low: Floats, latents: Ints, step: int, shape: tuple[int, int]
-) -> Floats:
+    model: Model, level: int, low: Floats, latents: Ints, step: int, shape: tuple[int, int],
+    part: Window | None = None, out: Floats | None = None, shown: bool = False,
+) -> Floats:  # fmt: skip
     """Computes the next finer planes, or a part of them.
 
     A part lacks neighbours at its edges: what is at most 3 positions from one that is not an edge
@@ -75,18 +76,30 @@ def finer(
         latents: int32 [9, h, w] latents of the level.
         step: Quantization step, as in PLAN.
         shape: Rows and columns of the finer planes: 2 h or 2 h - 1, and so on.
+        part: The part of these that is wanted; by default all.
+        out: float32 array for the part; by default a new one.
+        shown: Whether to put samples in place of planes, as `put_samples`; for level 1.
 
     Returns:
-        float32 [*shape, 3] planes.
+        The finer planes, float32 [rows, columns, 3], or their samples.
     """
+    part = part or Window.whole(shape)
+    out = np.empty((*part.shape, 3), np.float32) if out is None else out
+    if shown and not (kernel.available() and out.shape[2] == 3):
+        put_samples(model, finer(model, level, low, latents, step, shape, part), step, 0, out)
+        return out
     weights = model.synthesis[min(level, len(model.synthesis)) - 1]
     t = np.float32((step - STEP_ORIGIN) / 128)
-    gain = gains(weights, step)
+    gain, linear = gains(weights, step), _linear(model, level).astype(np.float32)
     bias = weights.first_bias.floats + weights.first_by_step.floats * t
-    linear = _linear(model, level).astype(np.float32)
     if kernel.available():
-        return synthesis_native.finer(weights, linear, gain, bias, low, latents, shape)
-    return _filtered(weights, linear, gain, bias, low, latents, shape)
+        colours = _colour_matrix(model, step, 0) if shown else None
+        synthesis_native.finer(
+            weights, linear, gain, bias, low, latents, shape, part, out, colours
+        )  # fmt: skip
+    else:
+        out[:] = _filtered(weights, linear, gain, bias, low, latents, shape)[part.at]
+    return out
 
 
 def gains(weights: Synthesis, step: int) -> Floats:
@@ -190,7 +203,7 @@ def _filtered(
     weights: Synthesis, linear: Floats, gain: Floats, bias: Floats, low: Floats, latents: Ints,
     shape: tuple[int, int],
 ) -> Floats:  # fmt: skip
-    """Does the same as `synthesis_native.finer`, in numpy."""
+    """Does the same as `synthesis_native.finer`, in numpy, for all of the finer planes."""
     h, w = low.shape[:2]
     # Outputs are ordered as 2 rows of 2 samples of 3 colours.
     order = np.arange(12).reshape(3, 2, 2).transpose(1, 2, 0).ravel()
