@@ -37,7 +37,7 @@ Chart::Chart(const Pose &p, const Points &moves, const Points &shown, const Refi
     : pose(p), mesh(w || !moves.empty() || !shown.empty() ? m : nullptr), weighs(w) {
     // Exact, because in floating point the determinant of a map that is not singular can become 0.
     const auto [a, b, c, d] = p.matrix;
-    const double whole = (double)((__int128)a * d - (__int128)b * c), unit = 1 << 24;
+    const double whole = (double)(a * d - b * c), unit = 1 << 24;  // products of less than 2**62 (POS-2)
     inverse[0] = d * unit / whole, inverse[1] = -c * unit / whole;
     inverse[2] = -b * unit / whole, inverse[3] = a * unit / whole;
     for (int k = 0; k < 2; k++) shift[k] = p.shift[k] / 1024.;
@@ -73,7 +73,7 @@ void Chart::prepare() {
 
 std::vector<int32_t> Chart::faces(const View &view, const Box &box, Budget &budget) const {
     const double scale[2] = {view.columns() / (double)view.region[2], view.rows() / (double)view.region[3]};
-    const bool turned = (__int128)pose.matrix[0] * pose.matrix[3] < (__int128)pose.matrix[1] * pose.matrix[2];
+    const bool turned = pose.matrix[0] * pose.matrix[3] < pose.matrix[1] * pose.matrix[2];
     std::vector<double> at(corners.size());
     for (size_t i = 0; i < at.size(); i++) at[i] = (corners[i] - view.region[i & 1]) * scale[i & 1];
     // Of several faces the one that is drawn last wins: of those that are upright, the first.

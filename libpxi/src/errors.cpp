@@ -19,4 +19,14 @@ void fail(Kind kind, const char *rule, const char *message, const Place &at) {
 void out_of_memory() { fail(Kind::LIMIT, "", "there is not enough memory"); }
 #endif
 
+__attribute__((noinline)) void need(bool ok, const char *rule, const char *message, const Place &at) {
+    if (!ok) fail(Kind::INVALID, rule, message, at);
+}
+__attribute__((noinline)) void supported(bool ok, const char *rule, const char *message, const Place &at) {
+    if (!ok) fail(Kind::UNSUPPORTED, rule, message, at);
+}
+__attribute__((noinline)) void usage(bool ok, const char *message) {
+    if (!ok) fail(Kind::USAGE, "", message);
+}
+
 }  // namespace pxi

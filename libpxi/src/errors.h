@@ -34,18 +34,9 @@ struct Failure {
 // Throws as `new` does; ends the instance without exceptions.
 [[noreturn]] void out_of_memory();
 
-// Refuses the file as invalid unless `ok`.
-inline void need(bool ok, const char *rule, const char *message, const Place &at = {}) {
-    if (!ok) [[unlikely]]
-        fail(Kind::INVALID, rule, message, at);
-}
-inline void supported(bool ok, const char *rule, const char *message, const Place &at = {}) {
-    if (!ok) [[unlikely]]
-        fail(Kind::UNSUPPORTED, rule, message, at);
-}
-inline void usage(bool ok, const char *message) {
-    if (!ok) [[unlikely]]
-        fail(Kind::USAGE, "", message);
-}
+// Refuse the file as invalid, or a file or a request, unless `ok`. Not inlined: they stand everywhere.
+void need(bool ok, const char *rule, const char *message, const Place &at = {});
+void supported(bool ok, const char *rule, const char *message, const Place &at = {});
+void usage(bool ok, const char *message);
 
 }  // namespace pxi

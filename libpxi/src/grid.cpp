@@ -70,6 +70,12 @@ std::vector<uint8_t> Grid::bands(const std::vector<uint8_t> &cells, int cell, in
     return out;
 }
 
+bool Grid::first(int level, Window w) const {
+    const Shape finer = at(level - 1);
+    return w.top < over(height, level) && w.left < over(width, level) &&
+           (w.top < finer.rows / 2 || w.left < finer.columns / 2);
+}
+
 std::vector<uint8_t> support_of(const Plan &p) {
     if (p.support.empty()) return {};
     return decode_mask(p.support, over(p.height, p.cell), over(p.width, p.cell), "PYR-5", p.at);

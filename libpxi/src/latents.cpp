@@ -9,7 +9,7 @@ static const int STEP_ORIGIN = 293, SHIFT_ORIGIN = 8;
 // Positions around a tile whose coarser levels its context depends on: 3, made even; and positions around
 // a window that the plain wavelet needs.
 static const int REACH = 4, AROUND = 3;
-static const int STRIP = 256;  // rows that are made at once, which bounds memory
+static const int STRIP = 128;  // rows that a thread makes at once, which bounds memory
 // Taps of the plain wavelet [low, high][even, odd][5] in 1/256 (PYR-16).
 static const int32_t TAPS[] = {0, -10, 202, -10, 0, 0, -17, 107, 107, -17,
                                6, -97, -97, 6,   0, 10, -28, 218, -28, 10};
@@ -179,6 +179,13 @@ std::vector<Latents::Tile> Latents::split() const {
     return out;
 }
 
+// Whether any latent of a window is coded. Where all cells are stored, the first position has some if any has.
+bool Latents::any(int level, Window window) {
+    if (cells.empty()) return grid.first(level, window);
+    const std::vector<uint8_t> own = cut(bands(level).data(), 1, grid.at(level), window);
+    return std::any_of(own.begin(), own.end(), [](uint8_t b) { return b; });
+}
+
 void Latents::index() {
     if (indexed) return;
     const std::vector<Tile> streams = split();
@@ -186,8 +193,7 @@ void Latents::index() {
     tiles = {};
     for (int level = grid.levels; level > 0; level--)
         for (const Window &at : grid.tiles(level, plan.tile)) {
-            const std::vector<uint8_t> own = cut(bands(level).data(), 1, grid.at(level), at);
-            if (std::all_of(own.begin(), own.end(), [](uint8_t b) { return !b; })) continue;
+            if (!any(level, at)) continue;
             need(next < streams.size(), "PYR-54", "the stream of a tile is missing", plan.at);
             tiles[level].push_back(streams[next++]);
             tiles[level].back().at = at;
@@ -207,19 +213,21 @@ const int32_t *Latents::plain(int level, Window window) {
     }
     if (!out) out.make(3 * shape.size()), made[level] = Made(shape);
     for (const Window &part : made[level].lacking(window)) {
-        for (Window strip = part; strip.top < part.bottom; strip.top = strip.bottom) {
-            strip.bottom = std::min(strip.top + STRIP, part.bottom);
-            const Shape coarser = grid.at(level + 1);
+        const Shape coarser = grid.at(level + 1);
+        const Window all = part.halved().grown(AROUND, coarser);
+        const int32_t *lows = plain(level + 1, all), *highs = this->level(level + 1, all);
+        parallel(watch.threads, (part.rows() + STRIP - 1) / STRIP, [&](int64_t k) {
+            const int top = part.top + (int)k * STRIP;
+            const Window strip = {top, std::min(top + STRIP, part.bottom), part.left, part.right};
             const Window above = strip.halved().grown(AROUND, coarser), under = above.doubled(shape);
-            const std::vector<int32_t> low = cut(plain(level + 1, above), 3, coarser, above);
-            const std::vector<int32_t> high = cut(this->level(level + 1, above), 9, coarser, above);
+            const std::vector<int32_t> low = cut(lows, 3, coarser, above), high = cut(highs, 9, coarser, above);
             std::vector<int32_t> found(3 * under.shape().size());
             const loops::Plain task = {low.data(), high.data(), above.rows(), above.columns(), under.rows(),
                                        under.columns(), TAPS, LATENT_LIMIT << 4, found.data()};
             check_core(core().next_plain(&task), plan.at);
             paste(found.data(), under.shape(), strip.inside(under), out.data(), shape, strip, 3);
             watch.ask();
-        }
+        });
         made[level].add(part);
     }
     return out.data();

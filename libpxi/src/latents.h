@@ -24,6 +24,8 @@ struct Grid {
     std::vector<Window> tiles(int level, int log2) const;
     // Bit b is set where the latents of band b are coded (PYR-6); `cells` that have any, or empty: all.
     std::vector<uint8_t> bands(const std::vector<uint8_t> &cells, int cell, int level) const;
+    // Whether the first position of a window has any, if all cells do.
+    bool first(int level, Window window) const;
 };
 
 // A stream of latents, and its escapes.
@@ -65,6 +67,7 @@ class Latents {
     // Reads one more level; `arrival`, which may be null, hears of its rows.
     void read_level(int level, Arrival *arrival = nullptr);
     void read_tiles(int level, const std::vector<Tile> &wanted);
+    bool any(int level, Window window);
     void index();
     std::vector<Tile> split() const;
 

@@ -170,9 +170,9 @@ static int hash_latents(pxi_file *file, pxi_error *error) {
     return PXI_OK;
 }
 
-static int write_png(const char *path, const void *pixels, const pxi_output *output, int bits) {
+static int write_png(const char *path, const void *pixels, const pxi_output *output, int bits, int threads) {
     FILE *to = fopen(path, "wb");
-    int bad = !to || png_write(to, pixels, output->width, output->height, bits, output->opaque ? 3 : 4);
+    int bad = !to || png_write(to, pixels, output->width, output->height, bits, output->opaque ? 3 : 4, threads);
     if (to && fclose(to)) bad = 1;
     if (!bad) return 0;
     fprintf(stderr, "pxi-dec: %s: %s\n", path, strerror(errno));
@@ -191,7 +191,7 @@ static int decode(pxi_file *file, Command *c, pxi_error *error) {
     if (!status) status = (int)pxi_measure(file, &c->request, &output, error);
     if (!status && !(pixels = malloc(output.bytes))) status = PXI_MEMORY;
     if (!status) status = (int)pxi_render(file, &c->request, pixels, output.bytes, 0, error);
-    if (!status) status = write_png(c->out, pixels, &output, c->bits);
+    if (!status) status = write_png(c->out, pixels, &output, c->bits, (int)c->request.threads);
     free(pixels), free(numbers);
     return status;
 }

@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import threading
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,9 @@ import pytest
 import proxyimg_codec as pxi
 from conformance.cases import find
 from proxyimg_codec.cli import decode
+from proxyimg_codec.codec.write import to_bytes
 from proxyimg_codec.io import raster
+from proxyimg_codec.io.color import profile_of, to_srgb
 from tests.support.paths import ROOT
 
 HERE = Path(__file__).parent
@@ -151,6 +154,26 @@ def test_motion(address: str, tmp_path: Path) -> None:
     assert np.abs(pixels(later) - pixels(still)).max() > 20
     assert_shows(played, expected(name, played, tmp_path, "--time", str(played["time"])))
     assert played["time"] != 0.25
+
+
+@needs_browser
+def test_colours_are_those_of_profiles(address: str, tmp_path: Path) -> None:
+    wide = bytes([12, 13, 0, 1])  # Display P3
+    pytest.importorskip("imagecodecs")
+    icc = profile_of(wide)
+    assert icc is not None
+    image, files = pxi.open(find("layers").input), []
+    for name, blocks in (("icc", {"icc": icc}), ("cicp", {"cicp": wide})):
+        files.append(tmp_path / f"{name}.pxi")
+        files[-1].write_bytes(to_bytes(replace(image.picture, blocks=blocks)))
+    for shown in browse(address, *(("drop", str(path)) for path in files)):
+        wanted = expected("layers", shown, tmp_path)
+        right = 255 * to_srgb(wanted[..., :3].astype(np.float32) / 255, {"cicp": wide})
+        assert np.abs(right - wanted[..., :3]).mean() > 1
+        error = np.abs(pixels(shown)[..., :3] - right)
+        # Browsers are less exact in the dark.
+        assert error.mean() < 0.5
+        assert error.max() < 7
 
 
 @needs_browser

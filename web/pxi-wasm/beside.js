@@ -27,9 +27,11 @@ export class Picture {
    * `options` are {signal, progress(share), limits, plain}.
    */
   static async open(source, { signal, progress, limits = {}, plain } = {}) {
+    signal?.throwIfAborted();
     const picture = new Picture();
-    picture.#opened = { task: "open", bytes: await bytesOf(source, signal), limits, plain };
+    picture.#start(); // while the file comes
     try {
+      picture.#opened = { task: "open", bytes: await bytesOf(source, signal), limits, plain };
       return Object.assign(picture, await picture.#ask(picture.#opened, { signal, progress }));
     } catch (error) {
       picture.close();

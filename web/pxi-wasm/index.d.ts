@@ -13,6 +13,8 @@ export class PxiError extends Error {
 export type Limits = Record<string, number>;
 /** Where the registered models are. */
 export const MODEL_FILES: Readonly<Record<number, URL>>;
+/** Begins to fetch and compile the decoder, before there is a file. */
+export function prepare(): void;
 /** The bytes of a registered model, fetched or read once. */
 export function loadModel(model: number): Promise<Uint8Array>;
 

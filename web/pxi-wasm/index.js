@@ -14,9 +14,13 @@ async function bytesOf(url) {
     const { readFile } = await import(/* webpackIgnore: true */ /* @vite-ignore */ "node:fs/promises");
     return new Uint8Array(await readFile(url));
   }
+  return new Uint8Array(await (await answerOf(url)).arrayBuffer());
+}
+
+async function answerOf(url) {
   const answer = await fetch(url);
   if (!answer.ok) throw new PxiError("io", `${url}: ${answer.status}`);
-  return new Uint8Array(await answer.arrayBuffer());
+  return answer;
 }
 
 const kept = new Map();
@@ -27,8 +31,33 @@ function once(key, make) {
   return kept.get(key);
 }
 
-const compiled = () => once("module", async () => WebAssembly.compile(await bytesOf(MODULE)));
+const compiled = () => once("module", async () => {
+  if (MODULE.protocol === "file:") return WebAssembly.compile(await bytesOf(MODULE));
+  const answer = await answerOf(MODULE);
+  const streams = answer.headers.get("Content-Type") === "application/wasm";
+  return streams ? WebAssembly.compileStreaming(answer) : WebAssembly.compile(await answer.arrayBuffer());
+});
 const plain = () => once("plain", () => import("../pxi/index.js"));
+
+/** Begins to fetch and compile the decoder, before there is a file. */
+export function prepare() {
+  if (runs()) compiled().catch(() => {});
+}
+
+const PACKED = ["iCCp", "eXIf", "xMPd", "mOTN"]; // chunks that hold zstd frames
+
+/** What decoding a file will need, as far as can be seen at once: a model, and what inflates zstd frames. */
+function glance(bytes) {
+  const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.length);
+  const found = { model: null, packed: false };
+  for (let at = 12; at + 12 <= bytes.length; at += 12 + view.getUint32(at + 4, true)) {
+    const kind = String.fromCharCode(...bytes.subarray(at, at + 4));
+    found.packed ||= PACKED.includes(kind);
+    // PLAN is an array, which begins with the number of its model.
+    if (kind === "PLAN" && bytes[at + 8] >> 4 === 9 && MODEL_FILES[bytes[at + 9]]) found.model ??= bytes[at + 9];
+  }
+  return found;
+}
 
 /** The bytes of a registered model, fetched or read once. */
 export function loadModel(model) {
@@ -56,14 +85,20 @@ export class Image {
     signal?.throwIfAborted();
     const bytes = content instanceof ArrayBuffer ? new Uint8Array(content) : content;
     // Pages may forbid what the machine runs.
-    const module = wanted ? null : await compiled().catch(() => null);
+    if (wanted) return openPlain(bytes, load, limits, signal);
+    const { model: first, packed } = glance(bytes);
+    const early = first === null ? null : (async () => load(first))();
+    early?.catch(() => {}); // it is awaited below, unless something else fails before
+    const inflater = packed ? import("../pxi/zstd.js") : null;
+    const module = await compiled().catch(() => null);
     signal?.throwIfAborted();
-    if (!module) return openPlain(bytes, load, limits, signal);
-    const instance = new Instance(module, Uint8Array.from(bytes), limits, telling(signal, progress));
+    if (!module) return openPlain(bytes, async (model) => (model === first ? early : load(model)), limits, signal);
+    const unzstd = (await inflater)?.unzstd;
+    const instance = new Instance(module, Uint8Array.from(bytes), limits, telling(signal, progress), unzstd);
     const { models, layers, duration, fps, opaque, ...rest } = instance.describe();
     for (const model of models) {
       const name = MODEL_FILES[model].pathname.split("/").pop();
-      instance.teach(name, new Uint8Array(await load(model)));
+      instance.teach(name, new Uint8Array(await (model === first ? early : load(model))));
       signal?.throwIfAborted();
     }
     const motion = duration ? { duration, fps } : null;

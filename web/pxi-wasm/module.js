@@ -1,7 +1,6 @@
 /** The WebAssembly module (libpxi/wasm/host.cpp): one instance for each file. */
 
 import { PxiError } from "../pxi/errors.js";
-import { unzstd } from "../pxi/zstd.js";
 
 const KINDS = { 2: "usage", 3: "io", 4: "invalid", 5: "unsupported", 6: "limit" };
 const INFO = ["width", "height", "opaque", "depth", "layers", "plans", "blocks", "duration", "fps",
@@ -30,15 +29,20 @@ export class Instance {
   #module;
   #bytes;
   #limits;
+  #unzstd;
   #models = new Map();
   #exports = null;
   #progress = () => {};
 
-  /** Reads and checks a file (Uint8Array); `progress(share)` may throw to stop it. */
-  constructor(module, bytes, limits, progress = () => {}) {
+  /**
+   * Reads and checks a file (Uint8Array); `progress(share)` may throw to stop it. `unzstd(frame, size)` inflates, if
+   * the file holds zstd frames.
+   */
+  constructor(module, bytes, limits, progress = () => {}, unzstd = null) {
     this.#module = module;
     this.#bytes = bytes;
     this.#limits = limits;
+    this.#unzstd = unzstd;
     this.#attempt(progress, () => {});
   }
 
@@ -61,7 +65,7 @@ export class Instance {
       log: Math.log,
       progress: (share) => this.#progress(share),
       inflate: (at, count, to, size) =>
-        this.#view(Uint8Array, to, size).set(unzstd(this.#view(Uint8Array, at, count).slice(), size)),
+        this.#view(Uint8Array, to, size).set(this.#unzstd(this.#view(Uint8Array, at, count).slice(), size)),
       failed: (kind, rule, message, chunk, offset) => {
         const [of, why] = [this.#string(chunk), this.#string(message)];
         const error = new PxiError(KINDS[kind], of ? `chunk ${of}: ${why}` : why);

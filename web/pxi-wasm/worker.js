@@ -1,9 +1,13 @@
 /** What beside.js asks for: {id, task, ..} is answered by {id, answer}, {id, share} or {id, error, ..}. */
 
-import { encodePng } from "../png.js";
-import { Image, PxiError, render } from "./index.js";
+import { Image, PxiError, prepare, render } from "./index.js";
 
+prepare(); // while the file comes
 let image = null;
+
+async function encodePng(...given) {
+  return (await import("../png.js")).encodePng(...given);
+}
 
 /** What PNG files say of the colours of the picture. */
 function colours() {
