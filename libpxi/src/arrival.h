@@ -29,11 +29,10 @@ class Arrival {
         rows = std::max(rows, count), failed |= fails;
         changed.notify_all();
     }
-    // The loops decode in waves, each of which a row that is looked ahead may precede, see native/context.h.
+    // The loops decode in waves, see native/context.h.
     static int hear(void *self, int done, int all) {
         Arrival &own = *(Arrival *)self;
-        const int waves = std::max(done - own.shape.rows, (int)((int64_t)3 * done / 4));
-        own.now((waves - own.shape.columns + 3) / 3);
+        own.now((done - own.shape.columns + 3) / 3);
         return own.outer.function ? own.outer.function(own.outer.user, done, all) : 0;
     }
 

@@ -59,7 +59,7 @@ template <int V> class ByteLinear : public InTiles<ByteLinear<V>, uint8_t, ints,
                 for (int o = 0; o < UNIT; o++)
                     std::memcpy(weights + o * PER_STEP,
                                 table.data() + ((block * UNIT + o) * offsets.size() + step) * PER_STEP, PER_STEP);
-                if (!Heights().hold(weights)) {
+                if (Heights(weights).exceeds(Heights())) {
                     for (int k = 0; k < UNIT * PER_STEP; k++)
                         half[k] = weights[k] / 2, weights[k] = (int8_t)(weights[k] - half[k]);
                     add(runs[block], offsets[step], half);
@@ -109,14 +109,23 @@ template <int V> class ByteLinear : public InTiles<ByteLinear<V>, uint8_t, ints,
     }
 
   private:
-    struct Heights {  // weights of one sign in each sum of 16 bits
-        int sums[UNIT * PER_STEP / 2][2] = {};
-        bool hold(const int8_t *weights) {  // more weights, if they can
-            Heights after = *this;
+    struct Heights {  // weights of either sign in each sum of 16 bits
+        int16_t sums[2][UNIT * PER_STEP / 2] = {};
+        Heights() = default;
+        explicit Heights(const int8_t *weights) {
             for (int k = 0; k < UNIT * PER_STEP; k++)
-                if ((after.sums[k / 2][weights[k] < 0] += std::abs(weights[k])) > MOST) return false;
-            *this = after;
-            return true;
+                sums[weights[k] < 0][k / 2] = (int16_t)(sums[weights[k] < 0][k / 2] + std::abs(weights[k]));
+        }
+        bool exceeds(const Heights &before) const {  // together with others
+            int over = 0;
+            for (int sign = 0; sign < 2; sign++)
+                for (int k = 0; k < UNIT * PER_STEP / 2; k++) over |= sums[sign][k] + before.sums[sign][k] > MOST;
+            return over;
+        }
+        void add(const Heights &more) {
+            for (int sign = 0; sign < 2; sign++)
+                for (int k = 0; k < UNIT * PER_STEP / 2; k++)
+                    sums[sign][k] = (int16_t)(sums[sign][k] + more.sums[sign][k]);
         }
     };
     struct Step {
@@ -132,13 +141,12 @@ template <int V> class ByteLinear : public InTiles<ByteLinear<V>, uint8_t, ints,
 
     // Puts a step into a run that has room.
     void add(std::vector<Run> &to, int32_t offset, const int8_t *weights) {
-        const auto has_room = [&](Run &run) { return run.heights.hold(weights); };
-        auto run = std::find_if(to.begin(), to.end(), has_room);
-        if (run == to.end()) {
-            to.emplace_back();
-            run = to.end() - 1;
-            run->heights.hold(weights);
-        }
+        const Heights more(weights);
+        auto run = std::find_if(to.begin(), to.end(), [&](const Run &r) { return !more.exceeds(r.heights); });
+        if (run == to.end())
+            run = to.insert(to.end(), {{}, more});
+        else
+            run->heights.add(more);
         run->steps.push_back({Sums::of((const int32_t *)weights), offset});
     }
 };

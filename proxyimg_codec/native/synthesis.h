@@ -51,6 +51,10 @@ class Synthesizer {
             }
         }
     };
+    struct Part {  // what a latent adds
+        float value;
+        const float *weights;
+    };
 
     const Synthesis &s;
     const int h, w, width;              // hidden units with padding
@@ -66,13 +70,27 @@ class Synthesizer {
     std::vector<float> between, cells;  // between both layers [width][RUN], and samples [CELL][RUN]
     std::vector<float> more;            // what latents add to these, [outputs][RUN]
     std::vector<float> sums;            // of the planes of three rows, [w + 2][3]
+    std::vector<Part> parts;            // of the latents of a position
     std::vector<const float *> inputs, hidden, units;  // of `first` or `linear`, of `second`, and of `third`
 
     static float soft(float x) { return x / (1 + std::abs(x) * .125f); }
-    // Adds a latent's part to n numbers, a multiple of LANES.
-    static void spread(float value, const float *weights, int n, float *to) {
-        typedef float part __attribute__((vector_size(4 * LANES), aligned(4), may_alias));
-        for (int k = 0; k < n; k += LANES) *(part *)(to + k) += value * *(const part *)(weights + k);
+    // Adds the parts of a position's latents to n numbers, a multiple of LANES, V vectors at a time.
+    template <int V = 4> static void spread(const std::vector<Part> &parts, int64_t start, int n, float *to) {
+        int k = 0;
+        for (; k + V * LANES <= n; k += V * LANES) {
+            vec sums[V];
+#pragma GCC unroll 4
+            for (int j = 0; j < V; j++) sums[j] = load(to + k + j * LANES);
+            for (const Part &part : parts) {
+                const float *weights = part.weights + start + k;
+#pragma GCC unroll 4
+                for (int j = 0; j < V; j++) sums[j] += part.value * load(weights + j * LANES);
+            }
+#pragma GCC unroll 4
+            for (int j = 0; j < V; j++) store(to + k + j * LANES, sums[j]);
+        }
+        if constexpr (V > 1)
+            if (k < n) spread<1>(parts, start + k, n - k, to + k);
     }
     // Where side x side neighbours lie in rows of planes.
     void around(Rows<float> &from, int side, int count, std::vector<const float *> &to) const {
@@ -113,12 +131,14 @@ class Synthesizer {
                 to[c * pitch + x] = soft(middle[k] - (column[k - 3] + column[k] + column[k + 3]) / 9);
         const int32_t *latents = s.latents + y * s.line;
         find_busy(latents, s.band, 0, w, some);
-        for (int x = std::max(x0 - 2, 0); x < std::min(x1 + 2, w); x++)
-            for (int c = 0; c < 9 && some[x]; c++)
+        for (int x = std::max(x0 - 2, 0); x < std::min(x1 + 2, w); x++) {
+            if (!some[x]) continue;
+            parts.clear();
+            for (int c = 0; c < 9; c++)
                 if (const int32_t latent = latents[c * s.band + x])
-                    for (int r = 0; r < 3; r++)
-                        spread(soft((float)latent * s.gain[c]), near.data() + (3 * c + r) * 3 * width, 3 * width,
-                               deep[r] + (int64_t)x * width);
+                    parts.push_back({soft((float)latent * s.gain[c]), &near[c * 9 * width]});
+            for (int r = 0; r < 3; r++) spread(parts, r * 3 * width, 3 * width, deep[r] + (int64_t)x * width);
+        }
     }
 
     // The next row of what the wavelet needs.
@@ -139,13 +159,14 @@ class Synthesizer {
         for (int x = x0 - 2; x < x1 + 2; x++) {
             if (!some[x]) continue;
             const int place[2] = {mirrored(x, s.columns, false), mirrored(x, s.columns, true)};
+            parts.clear();
             for (int c = 0; c < 9; c++) {
                 const int band = 1 + c % 3;
-                const int32_t latent = s.latents[c * s.band + lines[band > 1] * s.line + place[band & 1]];
-                for (int r = 0; r < 5 && latent; r++)
-                    spread((float)latent * s.gain[c], far.data() + (5 * c + r) * SPAN, SPAN,
-                           details[r] + (int64_t)(x + 2) * CELL);
+                if (const int32_t latent = s.latents[c * s.band + lines[band > 1] * s.line + place[band & 1]])
+                    parts.push_back({(float)latent * s.gain[c], &far[c * 5 * SPAN]});
             }
+            for (int r = 0; r < 5 && !parts.empty(); r++)
+                spread(parts, r * SPAN, SPAN, details[r] + (int64_t)(x + 2) * CELL);
         }
     }
 
