@@ -70,7 +70,7 @@ async function refresh() {
     }
     const started = performance.now();
     try {
-      const bitmap = await picture.bitmap({ ...wanted, layers: drawn, t: time });
+      const bitmap = await picture.bitmap({ ...wanted, layers: drawn, t: time, draft: coarse });
       if (state.picture !== picture) continue;
       state.shown = { bitmap, region: wanted.region, draft };
       state.stale ||= coarse;

@@ -89,7 +89,7 @@ void Latents::prepare(int level) {
     plain(level, whole), this->level(level + 1, whole.halved());
 }
 
-void Latents::read_level(int level, Arrival *arrival) {
+void Latents::read_level(int level, [[maybe_unused]] Arrival *arrival) {
     const Shape shape = grid.at(level);
     const Window whole = Window::whole(shape);
     const int32_t *low = plain(level, whole), *parent = this->level(level + 1, whole.halved());

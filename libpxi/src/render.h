@@ -14,6 +14,7 @@ struct Request {
     bool moving = false;
     int64_t time = 0;           // microseconds
     int threads = 1;
+    bool draft = false;         // of as few levels as a thumbnail can be seen in
     Limits limits;
     bool opaque(const Image &image) const { return image.file->head.opaque && !drawn.empty() && drawn[0] == 0; }
 };

@@ -82,7 +82,7 @@ void set_limits(Limits &limits, const pxi_limit *changes, uint32_t count) {
 }
 
 Request requested(const Image &image, const pxi_request &asked, const Limits &limits) {
-    Request out{view_of(image.file->head, asked), drawn_of(*image.file, asked), asked.moving != 0, 0, 1, limits};
+    Request out{view_of(image.file->head, asked), drawn_of(*image.file, asked), asked.moving != 0, 0, 1, false, limits};
     set_limits(out.limits, asked.limits, asked.limit_count);
     out.threads = (int)std::clamp<uint32_t>(asked.threads, 1, THREADS_MAX);
     if (!out.moving) return out;

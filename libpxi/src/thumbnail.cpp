@@ -35,8 +35,8 @@ int raster_of(const Image &image, const Request &request) {
     return file.layers[0].box == whole && plan.width == whole[2] && plan.height == whole[3] ? first.planes : -1;
 }
 
-// How many of the finest levels a thumbnail does without.
-int spare(const Plan &plan, double span) {
+// How many of the finest levels a thumbnail does without; a draft, without all that are finer than its pixels.
+int spare(const Plan &plan, double span, bool draft) {
     double error = 0;
     int found = 0;
     for (int level = 1; level <= plan.levels; level++) {
@@ -44,7 +44,7 @@ int spare(const Plan &plan, double span) {
         error += std::pow(detail * (1 << (level - 1)) / span, 2);
         // Interpolating what is left blurs it, the more levels there are, the more.
         const double lost = error * (0.7 + 0.15 * level);
-        if (lost > ERROR_MAX * ERROR_MAX || span < SPAN_MIN * (1 << level)) break;
+        if (draft ? span < 1 << level : lost > ERROR_MAX * ERROR_MAX || span < SPAN_MIN * (1 << level)) break;
         found = level;
     }
     return found;
@@ -114,7 +114,7 @@ bool thumbnail(Image &image, const Request &request, const Pixels &pixels, Told 
         return true;
     }
     const double across = view.region[2] / (double)view.width, down = view.region[3] / (double)view.height;
-    const int level = spare(image.file->plans[number], std::min(across, down));
+    const int level = spare(image.file->plans[number], std::min(across, down), request.draft);
     int rows, columns;
     image.textures->shape(number, level, &rows, &columns);
     const Taps y(view.region[1], down, view.height, level, rows), x(view.region[0], across, view.width, level, columns);

@@ -91,13 +91,14 @@ EXPORTED("draw") void draw(int layer) { drawn.push_back((uint32_t)layer); }
 
 // Draws the layers that `draw` told, or all, and forgets them; the pixels are there until the host gives them up.
 EXPORTED("render") void *render(uint32_t x, uint32_t y, uint32_t w, uint32_t h, uint32_t width, uint32_t height,
-                                uint32_t format, int moving, double time) {
+                                uint32_t format, int moving, double time, int draft) {
     pxi_request asked = PXI_REQUEST_INIT;
     asked.x = x, asked.y = y, asked.region_width = w, asked.region_height = h;
     asked.width = width, asked.height = height, asked.format = format;
     asked.moving = (uint32_t)moving, asked.time = time;
     if (!drawn.empty()) asked.layers = drawn.data(), asked.layer_count = drawn.size();
-    const Request own = requested(*image, asked, limits);
+    Request own = requested(*image, asked, limits);
+    own.draft = draft;
     drawn.clear(), limits = limits_of_file;
     const uint64_t stride = (uint64_t)own.view.width * pixel_bytes(format), size = stride * own.view.height;
     if (size > PTRDIFF_MAX) out_of_memory();

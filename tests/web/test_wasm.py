@@ -1,5 +1,6 @@
 """libpxi as WebAssembly, with its face in JavaScript; test_wasm_suite.py judges it."""
 
+import gzip
 import json
 import os
 import re
@@ -17,6 +18,8 @@ from tests.support.paths import ROOT
 
 HERE = Path(__file__).parent
 NODE = shutil.which("node")
+
+ESBUILD = HERE / "node_modules" / ".bin" / "esbuild"
 
 needs_node = pytest.mark.skipif(NODE is None, reason="node is not installed")
 
@@ -92,3 +95,28 @@ def test_package_holds_what_it_exports() -> None:
             assert any((ROOT / path).is_relative_to(file) for file in files), path
     assert all(file.exists() for file in files)
     assert package["version"] == pxi.__version__
+
+
+def packed(path: Path) -> int:
+    """Bytes of a file in transit."""
+    return len(gzip.compress(path.read_bytes(), 9))
+
+
+@pytest.mark.usefixtures("wasm")
+@pytest.mark.skipif(not ESBUILD.exists(), reason="no bundler: npm install --prefix tests/web")
+def test_a_bundle_is_small_and_runs(tmp_path: Path) -> None:
+    folder = tmp_path / "web" / "pxi-wasm"
+    flags = ("--bundle", "--minify", "--splitting", "--format=esm", "--external:node:*")
+    run(ESBUILD, ROOT / "web/pxi-wasm/index.js", *flags, f"--outdir={folder}")
+    module = Path(shutil.copy(ROOT / "web/pxi-wasm/pxi.wasm", folder))
+    shutil.copytree(ROOT / "proxyimg_codec/models", tmp_path / "proxyimg_codec/models")
+    needed = re.findall(r'from"\./(chunk-\w+\.js)"', (folder / "index.js").read_text())
+    face = sum(packed(folder / name) for name in ["index.js", *needed])
+    assert packed(module) + face < 80 * 1024
+    script = (
+        "import { readFileSync } from 'node:fs';"
+        "import { Image, render } from './web/pxi-wasm/index.js';"
+        f"const image = await Image.open(readFileSync({json.dumps(str(find('pyramid').input))}));"
+        "console.log(image.plain, render(image, { width: 7 }).height);"
+    )
+    assert run(str(NODE), "--input-type=module", "-e", script, cwd=tmp_path) == "false 5\n"

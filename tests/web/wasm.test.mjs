@@ -79,6 +79,14 @@ test("progress grows to the whole", async () => {
   assert.equal(shares.at(-1), 1);
 });
 
+test("a draft shows the same less exactly", async () => {
+  const [draft, whole] = [true, false].map((draft) => ({ width: 5, draft }));
+  const image = await Image.open(bytes);
+  const coarse = render(image, draft).data;
+  const exact = render(image, whole).data;
+  assert.ok(coarse.every((value, i) => Math.abs(value - exact[i]) < 40));
+});
+
 test("models are read when a file needs them, and missing ones are an error", async () => {
   const asked = [];
   const load = async (model) => asked.push(model) && readFileSync(MODEL_FILES[model]);

@@ -57,7 +57,7 @@ export class Picture {
   /** Gives `show(bitmap, coarse)` a coarse bitmap of {width, height, ..} first, then the whole one. */
   async show({ width, height, ...options }, show) {
     const least = (size) => Math.max(Math.round(size * COARSE), 1);
-    show(await this.bitmap({ ...options, width: least(width), height: least(height) }), true);
+    show(await this.bitmap({ ...options, width: least(width), height: least(height), draft: true }), true);
     show(await this.bitmap({ ...options, width, height }), false);
   }
 

@@ -72,6 +72,8 @@ export interface View {
   /** Seconds; null is the picture at rest. */
   t?: number | null;
   limits?: Limits;
+  /** Whether a small picture may be less exact than it could be, to be there at once; the plain decoder draws all. */
+  draft?: boolean;
 }
 export type Samples = { uint8: Uint8ClampedArray; uint16: Uint16Array; float32: Float32Array };
 export interface RenderOptions<T extends keyof Samples = "uint8"> extends View, Stopping {

@@ -111,12 +111,12 @@ export class Image {
   }
 
   /** What `render` does. */
-  draw({ signal, progress, ...options } = {}) {
+  draw({ signal, progress, draft = false, ...options } = {}) {
     signal?.throwIfAborted();
     const all = { dtype: "uint8", ...options };
     const request = requested(this, all);
     const told = telling(signal, progress);
-    if (this.#instance) return this.#instance.render(request, all.t ?? null, all.limits ?? {}, told);
+    if (this.#instance) return this.#instance.render(request, all.t ?? null, all.limits ?? {}, told, draft);
     const { image, render: drawn } = this.#plain;
     const count = request.width * request.height;
     let done = 0;
@@ -156,7 +156,7 @@ function withAlpha({ width, height, data }) {
  * Draws a picture: {width, height, channels: 4, opaque, data}, straight RGBA.
  *
  * `options` are those of the plain decoder, only that `dtype` is "uint8" by default, `progress` takes the share
- * that is done, 0..1, and `signal` may stop it.
+ * that is done, 0..1, and `signal` may stop it. `draft` draws small pictures less exactly, in a fraction of the time.
  */
 export function render(image, options) {
   return image.draw(options);

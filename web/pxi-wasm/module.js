@@ -134,13 +134,13 @@ export class Instance {
     this.#attempt(() => {}, () => this.#teach(name, weights));
   }
 
-  /** Draws what `requested` (request.js) has checked; `t` in seconds or null. RGBA, straight. */
-  render({ region, width, height, drawn, dtype }, t, limits, progress) {
+  /** Draws what `requested` (request.js) has checked; `t` in seconds or null. RGBA, straight. `draft`: coarsely. */
+  render({ region, width, height, drawn, dtype }, t, limits, progress, draft) {
     return this.#attempt(progress, (e) => {
       for (const [name, value] of Object.entries(limits)) this.#limit(name, value);
       for (const layer of drawn) e.draw(layer);
       const [format, Type] = FORMATS[dtype];
-      const at = e.render(...region, width, height, format, t === null ? 0 : 1, t ?? 0);
+      const at = e.render(...region, width, height, format, t === null ? 0 : 1, t ?? 0, draft);
       const data = this.#view(Type, at, 4 * width * height).slice();
       e.give_up(at);
       return { width, height, channels: 4, opaque: e.opaque() === 1, data };
