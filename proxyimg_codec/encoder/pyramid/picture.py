@@ -160,7 +160,7 @@ def _coded(
     interrupts: Interrupts,
 ) -> list[Planes]:  # fmt: skip
     """Encodes all rasters at the step of index `step`; records an interrupt in `interrupts`."""
-    work = sum(r.samples[..., 0].size * effort.turns(r.structural) for r in rasters)
+    work = sum(r.samples[..., 0].size * r.effort(effort).turns(r.structural) for r in rasters)
     done = 0
 
     def tick(samples: int) -> None:
@@ -171,8 +171,8 @@ def _coded(
     out = []
     for raster in rasters:
         planes, complete = encode(
-            raster, step, Effort(0, 0) if interrupts.seen else effort, settings.seed, tick,
-            settings.jobs,
+            raster, step, Effort(0, 0) if interrupts.seen else raster.effort(effort),
+            settings.seed, tick, settings.jobs,
         )  # fmt: skip
         interrupts.seen |= not complete
         out.append(planes)
@@ -281,7 +281,8 @@ def colour_of(picture: Floats) -> Raster:
 
 def alpha_of(alpha: Floats) -> Raster:
     """Makes a grey raster of alpha, float32 [H, W] in 0..1."""
-    return Raster(np.repeat(alpha[..., None] * np.float32(255), 3, 2), None, None, True)
+    samples = np.repeat(alpha[..., None] * np.float32(255), 3, 2)
+    return Raster(samples, grey=True, alpha=True)
 
 
 def within(alpha: Floats, share: Floats, same: float) -> Floats:
