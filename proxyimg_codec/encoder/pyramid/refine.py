@@ -123,7 +123,7 @@ def cost(model: Model, target: Target, latents: Sequence[Tensor], smooth: bool =
     shown = model.synthesise(list(latents), target.step, target.picture.shape[2:])
     if target.similarity is not None:
         weight = 1.0 if target.weight is None else target.weight
-        alike = ms_ssim(shown * weight, target.picture * weight)
+        alike = ms_ssim(shown * weight, target.picture * weight, mirror=True)
         return Cost(target.similarity * (1 - alike), spent, likely, target.price)
     # What is beyond 0..255 is shown as these bounds; slopes lead back there all the same.
     shown = shown + (shown.clamp(0, 255) - shown).detach()

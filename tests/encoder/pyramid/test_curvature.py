@@ -78,3 +78,19 @@ def test_samples_beyond_the_bounds_are_no_error():
     darker = [v.copy() for v in brighter]
     darker[-1][0] -= 30
     assert engine_native.slopes(goal, darker, 1)[0] > 100
+
+
+def test_borders_count_in_ms_ssim_if_it_mirrors():
+    """Without, the weight of the first column is that of the last sample of one window."""
+    torch = pytest.importorskip("torch")
+    from proxyimg_codec.encoder.pyramid.similarity import ms_ssim
+
+    a = torch.rand(1, 3, 40, 31, generator=torch.Generator().manual_seed(0)) * 255
+    less = []
+    for column in (0, 15):
+        b = a.clone()
+        b[..., column] = 255 - b[..., column]
+        less.append([1 - float(ms_ssim(a, b, mirror)) for mirror in (False, True)])
+    (edge, mirrored), (inside, _) = less
+    assert edge < 0.1 * inside
+    assert mirrored > 0.15 * inside
