@@ -21,6 +21,7 @@ struct Refine {
     const uint8_t *const *free;         // of the same shapes, 1 where latents may change; or null
     const float *picture;               // [3][rows][columns] in 0..255
     const float *weight;                // [rows][columns]; or null
+    const float *const *bends;          // [levels + 1]: [3][h][w], then [1][h][w], of curvature.py; or null in tally
     const float *colour;                // [3][3]
     const float *axis;                  // [2][2][5]
     int32_t levels, rows, columns, rounds, threads;
@@ -62,6 +63,7 @@ class Refiner {
             copy_in(s.latents[k], level.latents);
             if (s.support) level.support = Floats(9, level.w, level.h), copy_in(s.support[k], level.support);
             if (s.support || s.free) restrict(k);
+            if (s.bends) copy_in(s.bends[k], level.bends);
             rows = level.h, columns = level.w;
         }
         errors.resize(levels[0].h);
@@ -188,7 +190,8 @@ class Refiner {
                 for (int x = 0; x < level.w; x++) {
                     const int64_t at = ((int64_t)c * level.h + y) * level.w + x;
                     const float slope = level.by_low(y, c)[x] + level.by_plain(y, c)[x];
-                    if (std::abs(slope) <= 1 + LEAST || (x + y) % 2) continue;  // none beside each other
+                    const float bend = s.bends[s.levels][(int64_t)y * level.w + x];
+                    if (std::abs(slope) <= bend + LEAST || (x + y) % 2) continue;  // none beside each other
                     if (s.support && s.support[s.levels][at] == 0) continue;
                     if (s.free && !s.free[s.levels][at]) continue;
                     level.plain(y, c)[x] -= slope > 0 ? 1 : -1;

@@ -120,7 +120,7 @@ class ContextForward {
         vec total = {};
         for (int c = 0; c < 9; c++) {
             const float *mean = out(0, mean_at(c)), *scale = out(0, scale_at(c)), shift = s.weights.shifts[c >= 3];
-            const float bend = s.weights.gain[c] * s.weights.gain[c];
+            const float unit = s.weights.gain[c] * s.weights.gain[c];
             for (int x = 0; x < w; x += LANES) {
                 const vec raw = load(scale + x), low = all(-4.f), high = all(3.875f);
                 const vec moved = least(most(raw, low), high) + shift;
@@ -132,6 +132,7 @@ class ContextForward {
                 counts *= price;
                 store(s.slopes(y, mean_at(c)) + x, -r.slope * counts);
                 store(s.slopes(y, scale_at(c)) + x, r.by_scale * counts * within);
+                const vec bend = load(s.bends(y, c % 3) + x) * unit;
                 store(s.up(y, c) + x, bend + price * (r.above - r.here));
                 store(s.down(y, c) + x, bend + price * (r.below - r.here));
             }

@@ -43,6 +43,7 @@ struct RefinedLevel {
     RefinedWeights weights;
     int h, w, rows, columns;      // rows and columns of the finer planes
     Floats latents;               // [9]
+    Floats bends;                 // [3] what a move adds to the error, in squares of the gain
     Floats support, may;          // [9] 1 for latents that are coded, or that may move; or of no channels
     Floats last, best;            // [9] last move of each latent; [1] most that one of a position gains
     Floats plain, low;            // [3] planes that the plain wavelet and the synthesis give
@@ -56,7 +57,7 @@ struct RefinedLevel {
 
     RefinedLevel(const RefinedWeights &weights, int rows, int columns)
         : weights(weights), h((rows + 1) / 2), w((columns + 1) / 2), rows(rows), columns(columns), latents(9, w, h),
-          last(9, w, h), best(1, w, h), plain(3, w, h), low(3, w, h), slopes(18, w, h), up(9, w, h), down(9, w, h), by_latents(9, w, h),
+          bends(3, w, h), last(9, w, h), best(1, w, h), plain(3, w, h), low(3, w, h), slopes(18, w, h), up(9, w, h), down(9, w, h), by_latents(9, w, h),
           by_plain(3, w, h), by_low(3, w, h), by_inputs{Floats(3, w, h), Floats(3, w, h)}, cells(12, w, h),
           by_wide(12, w + 4, h + 4), first(weights.context, w, h), second(weights.context, w, h),
           mix(weights.context, w, h), luma(weights.context, w, h), in(weights.hidden, w, h),

@@ -105,7 +105,8 @@ class SynthesisForward {
                 for (int x = 0; x < s.columns; x++) to[x] = x % 2 ? odd[x / 2] : even[x / 2];
             }
     }
-    // Weighted squared error of a row in squares of the step; its slopes become those of the cells.
+    // Weighted squared error of a row in squares of the step; its slopes become those of the cells. What is
+    // beyond 0..255 is shown as these bounds.
     double compare(int y, const Wanted &wanted) {
         vec total = {};
         const float *m = wanted.colour;
@@ -114,10 +115,12 @@ class SynthesisForward {
                 const vec weight = load(wanted.weight(y, k) + x);
                 vec slopes[3] = {};
                 for (int i = 0; i < 3; i++) {
-                    vec shown = all(128 / wanted.step) - load(wanted.picture(y, 4 * i + k) + x);
+                    vec shown = all(128 / wanted.step);
                     for (int c = 0; c < 3; c++) shown += load(out(0, 4 * c + k) + x) * m[3 * i + c];
-                    total += weight * shown * shown;
-                    for (int c = 0; c < 3; c++) slopes[c] += 2.f * weight * shown * m[3 * i + c];
+                    shown = most(least(shown, all(255 / wanted.step)), (vec){});
+                    const vec off = shown - load(wanted.picture(y, 4 * i + k) + x);
+                    total += weight * off * off;
+                    for (int c = 0; c < 3; c++) slopes[c] += 2.f * weight * off * m[3 * i + c];
                 }
                 for (int c = 0; c < 3; c++) store(s.cells(y, 4 * c + k) + x, slopes[c]);
             }

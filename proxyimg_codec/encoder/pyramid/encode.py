@@ -19,6 +19,7 @@ from ...texture.network import Floats
 from ...texture.planes import Planes
 from ...texture.registered_model import registered
 from . import engine_native
+from .borders import bordered
 from .goal import DEAD_ZONE, LEVELS, Effort, Goal, shrink
 from .shifts import SHIFTS, best_shift
 from .window import Window, windows
@@ -35,6 +36,9 @@ EFFORTS = (
 )  # fmt: skip
 """Duration of refinement at effort 1..9: each takes 1.3 to 1.5 times as long as the one before."""
 
+ALPHA_ROUNDS = 4
+"""Least rounds for alpha, in which the moves along its steep edges are made one after the other."""
+
 TRIAL = 2
 """Rounds after which the shifts of the scale index are found again, if at least as many follow."""
 
@@ -49,6 +53,7 @@ class Raster(NamedTuple):
             all.
         grey: Whether only one component is coded.
         structural: Whether to aim at MS-SSIM instead of the squared error.
+        alpha: Whether the samples are the alpha of a picture.
     """
 
     samples: Floats
@@ -56,11 +61,17 @@ class Raster(NamedTuple):
     cells: NDArray[np.bool_] | None = None
     grey: bool = False
     structural: bool = False
+    alpha: bool = False
 
     @property
     def size(self) -> tuple[int, int]:
         """Columns and rows of samples."""
         return self.samples.shape[1], self.samples.shape[0]
+
+    def effort(self, effort: Effort) -> Effort:
+        """Effort for this raster of that for a picture."""
+        least = ALPHA_ROUNDS if self.alpha and effort.rounds else 0
+        return effort._replace(rounds=max(effort.rounds, least))
 
 
 def levels_for(size: tuple[int, int]) -> int:
@@ -92,6 +103,8 @@ def encode(
         LimitError: There is not enough memory.
         UnsupportedError: torch is needed and not installed.
     """
+    if not raster.structural:
+        raster = raster._replace(weight=bordered(raster.samples, raster.weight, raster.alpha, step))
     job = Job(NUMBER, raster, step, threads)
     complete = True
     try:

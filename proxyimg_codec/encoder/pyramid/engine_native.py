@@ -27,6 +27,7 @@ from ...texture.registered_model import (
 )
 from ...texture.synthesis import axis_filters, wavelet
 from ...texture.watch import WATCH
+from .curvature import bends
 from .filters import analysis_wavelet
 from .goal import FIRST_SHARE, HESITATION, RAMP, SURE, Effort, Goal
 from .shifts import SHIFTS
@@ -62,8 +63,8 @@ class _Refine(ct.Structure):
     """Mirrors `struct Refine`."""
 
     _fields_ = [
-        *((n, ct.c_void_p) for n in ("weights", "latents", "support", "free", "picture", "weight")),
-        *((n, ct.c_void_p) for n in ("colour", "axis")),
+        *((n, ct.c_void_p) for n in ("weights", "latents", "support", "free", "picture")),
+        *((n, ct.c_void_p) for n in ("weight", "bends", "colour", "axis")),
         *(
             (n, ct.c_int32)
             for n in ("levels", "rows", "columns", "rounds", "threads", "done", "sure", "ramp")
@@ -131,10 +132,14 @@ class Task:
         latents: float32 [9, h, w] latents of levels 1, 2, ..., then the lowest planes [3, h, w];
             whole numbers, contiguous; results take their place.
         threads: Number of threads.
+        bending: Whether latents move, for which it takes curvatures.
         fields: Other fields of the structure.
     """
 
-    def __init__(self, goal: Goal, latents: Sequence[Floats], threads: int, **fields: Any) -> None:
+    def __init__(
+        self, goal: Goal, latents: Sequence[Floats], threads: int, bending: bool = True,
+        **fields: Any,
+    ) -> None:  # fmt: skip
         self._kept: list[Any] = []
         count = len(latents) - 1
         sets = _weights(goal.model, goal.step)
@@ -148,11 +153,13 @@ class Task:
                 levels[k].shifts[group] = goal.shifts[2 * k + group] / 8
         self._kept += [sets, levels, latents]
         rows, columns = goal.picture.shape[1:]
+        bent = bends((rows, columns), count, goal.weight) if bending else None
         colour = registered(goal.model).to_colour.floats
         self.structure = _Refine(
             weights=ct.cast(levels, ct.c_void_p), latents=self._table(latents, np.float32),
             support=self._table(goal.support, np.float32), free=self._table(goal.free, np.bool_),
             picture=self._array(goal.picture), weight=self._array(goal.weight),
+            bends=self._table(bent, np.float32),
             colour=self._array(colour), axis=self._array(axis_filters().astype(np.float32)),
             levels=count, rows=rows, columns=columns, threads=threads, ramp=RAMP,
             step=2.0 ** (goal.step / 64), price=goal.price, share=FIRST_SHARE,
@@ -259,7 +266,7 @@ def bits_by_shift(goal: Goal, latents: Sequence[Floats], threads: int) -> NDArra
     """
     given = [np.ascontiguousarray(y) for y in latents]
     out = np.zeros((2 * (len(given) - 1), len(SHIFTS)))
-    Task(goal, given, threads, cost=kernel.pointer(out)).run("refine_tally")
+    Task(goal, given, threads, bending=False, cost=kernel.pointer(out)).run("refine_tally")
     return out
 
 

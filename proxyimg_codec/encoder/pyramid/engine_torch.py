@@ -20,6 +20,7 @@ try:
     # program that imports torch before this module sets the variable itself.
     from ..yielding import torch
     from . import refine
+    from .curvature import bends
     from .load import load
     from .model import LOG_SCALES
     from .rate import bits_at
@@ -112,6 +113,7 @@ def target_of(goal: Goal) -> refine.Target:
         tensor(goal.picture), None if goal.weight is None else tensor(goal.weight[None]),
         None if goal.support is None else list(map(tensor, goal.support)), free,
         torch.tensor([2.0 ** (goal.step / 64)]), goal.shifts, price=goal.price,
+        bends=list(map(tensor, bends(goal.picture.shape[1:], len(goal.shifts) // 2, goal.weight))),
     )  # fmt: skip
 
 

@@ -23,7 +23,7 @@ their cost, so a finer step with dearer bits is better.
 DEAD_ZONE = 0.2
 """Distance by which latents of the analysis are moved towards zero before refinement."""
 
-FIRST_SHARE, RAMP = 0.4, 6
+FIRST_SHARE, RAMP = 0.55, 6
 """Share of the best gain around a latent that its own move has to gain, in the first round; it
 rises to 1 in so many rounds."""
 

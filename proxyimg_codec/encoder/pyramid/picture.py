@@ -131,7 +131,7 @@ def encode_rasters(
         UsageError: A target size or PSNR is out of reach.
     """
     effort = EFFORTS[settings.effort_for(original[..., 0].size) - 1]
-    work = sum(r.samples[..., 0].size * effort.turns(r.structural) for r in rasters)
+    work = sum(r.samples[..., 0].size * r.effort(effort).turns(r.structural) for r in rasters)
     done = 0
 
     def tick(samples: int) -> None:
@@ -143,7 +143,8 @@ def encode_rasters(
         return aimed(rasters, shown, picture_of, original, settings, effort, tick)
     out = []
     for raster in rasters:
-        planes, complete = encode(raster, settings.step, effort, settings.seed, tick, settings.jobs)
+        own = raster.effort(effort)
+        planes, complete = encode(raster, settings.step, own, settings.seed, tick, settings.jobs)
         effort = effort if complete else Effort(0, 0)
         out.append(planes)
     return picture_of(out)
@@ -203,7 +204,8 @@ def colour_of(picture: Floats) -> Raster:
 
 def alpha_of(alpha: Floats) -> Raster:
     """Makes a grey raster of alpha, float32 [H, W] in 0..1."""
-    return Raster(np.repeat(alpha[..., None] * np.float32(255), 3, 2), None, None, True)
+    samples = np.repeat(alpha[..., None] * np.float32(255), 3, 2)
+    return Raster(samples, grey=True, alpha=True)
 
 
 def within(alpha: Floats, share: Floats, same: float) -> Floats:

@@ -35,6 +35,8 @@ class Target(NamedTuple):
         similarity: Weight of 1 - MS-SSIM, in squares of the step, as the error; None to use the
             squared error instead.
         price: Error that a bit is worth, in squares of the step.
+        bends: Factors of the curvature of the error, as `curvature.bends` gives them, [1, 3, h, w]
+            and [1, 1, h, w]; None = 1.
     """
 
     picture: Tensor
@@ -45,6 +47,7 @@ class Target(NamedTuple):
     shifts: Sequence[int] | None = None
     similarity: float | None = None
     price: float = RATE_WEIGHT
+    bends: Sequence[Tensor] | None = None
 
 
 def annealed(share: float) -> float:
@@ -120,8 +123,10 @@ def cost(model: Model, target: Target, latents: Sequence[Tensor], smooth: bool =
     shown = model.synthesise(list(latents), target.step, target.picture.shape[2:])
     if target.similarity is not None:
         weight = 1.0 if target.weight is None else target.weight
-        alike = ms_ssim(shown * weight, target.picture * weight)
+        alike = ms_ssim(shown * weight, target.picture * weight, mirror=True)
         return Cost(target.similarity * (1 - alike), spent, likely, target.price)
+    # What is beyond 0..255 is shown as these bounds; slopes lead back there all the same.
+    shown = shown + (shown.clamp(0, 255) - shown).detach()
     error = (shown - target.picture) ** 2
     if target.weight is not None:
         error = error * target.weight
@@ -259,6 +264,8 @@ def moves(
         own = around(latents[k], *p)
         outer = slopes[k] - price * own.slope
         bend = model.level(k + 1).gains_at(target.step) ** 2
+        if target.bends is not None:
+            bend = bend * target.bends[k].tile(1, 3, 1, 1)
         down = bend - outer + price * (own.below - own.here)
         up = bend + outer + price * (own.above - own.here)
         change = torch.where(up < down, 1.0, -1.0)
@@ -273,7 +280,8 @@ def moves(
         # their values count as equally cheap; of those beside each other one moves.
         rows, columns = (torch.arange(n) for n in change.shape[2:])
         some = (rows[:, None] + columns) % 2 == 0
-        change = -torch.sign(slopes[-1]) * ((slopes[-1].abs() > 1 + LEAST_GAIN) & some)
+        bend = torch.ones(1) if target.bends is None else target.bends[-1]
+        change = -torch.sign(slopes[-1]) * ((slopes[-1].abs() > bend + LEAST_GAIN) & some)
         change = change * _allowed(target, len(likely), change)
     return [*out, change]
 

@@ -16,7 +16,7 @@ WINDOW, SIGMA = 11, 1.5
 """Side and standard deviation of the Gaussian window in samples."""
 
 
-def ms_ssim(a: Tensor, b: Tensor) -> Tensor:
+def ms_ssim(a: Tensor, b: Tensor, mirror: bool = False) -> Tensor:
     """Multi-scale structural similarity of pictures.
 
     Pictures that are too small for all scales use the first ones, with exponents that sum to 1; for
@@ -25,6 +25,8 @@ def ms_ssim(a: Tensor, b: Tensor) -> Tensor:
     Args:
         a: float32 [B, C, H, W] pictures in 0..255.
         b: float32 [B, C, H, W] pictures to compare them with.
+        mirror: Whether windows go beyond borders, where pictures are mirrored. Otherwise samples at
+            a border hardly count, so whoever aims at it spoils them.
 
     Returns:
         float32 [B], 1 for equal pictures.
@@ -34,7 +36,8 @@ def ms_ssim(a: Tensor, b: Tensor) -> Tensor:
     total = sum(WEIGHTS[:scales])
     out = torch.ones(a.shape[0], channels)
     for scale in range(scales):
-        mean = _blur(torch.cat([a, b, a * a, b * b, a * b])).chunk(5)
+        products = torch.cat([a, b, a * a, b * b, a * b])
+        mean = _blur(_mirrored(products) if mirror else products).chunk(5)
         ab, aa, bb = mean[0] * mean[1], mean[0] ** 2, mean[1] ** 2
         part = (2 * (mean[4] - ab) + C2) / (mean[2] - aa + mean[3] - bb + C2)
         if scale == scales - 1:
@@ -44,6 +47,12 @@ def ms_ssim(a: Tensor, b: Tensor) -> Tensor:
         if scale < scales - 1:
             a, b = F.avg_pool2d(a, 2), F.avg_pool2d(b, 2)
     return out.mean(1)
+
+
+def _mirrored(x: Tensor) -> Tensor:
+    """Pictures [B, C, H, W] with as much beyond their borders as half of a window takes."""
+    down, across = (min(WINDOW // 2, n - 1) for n in x.shape[2:])
+    return F.pad(x, (across, across, down, down), mode="reflect")
 
 
 def _blur(x: Tensor) -> Tensor:

@@ -57,7 +57,7 @@ def decibel(errors):
     ],
 )
 def test_borders_are_as_exact_as_when_the_picture_goes_on(size, kind, quality, effort):
-    """Within 2 dB on each side, and 0.7 dB in the mean, of the same samples in a larger cut."""
+    """Within 1.5 dB on each side, and 0.7 dB in the mean, of the same samples in a larger cut."""
     pixels, (w, h) = photo(kind), size
     y, x = (pixels.shape[0] - h) // 2, (pixels.shape[1] - w) // 2
     own = error(pixels[y : y + h, x : x + w], quality, effort)
@@ -65,7 +65,7 @@ def test_borders_are_as_exact_as_when_the_picture_goes_on(size, kind, quality, e
     other = error(wide, quality, effort)[BEYOND:-BEYOND, BEYOND:-BEYOND]
     sides = [np.s_[:, :RING], np.s_[:, -RING:], np.s_[:RING], np.s_[-RING:]]
     less = [decibel(own[s]) - decibel(other[s]) for s in sides]
-    assert min(less) > -2
+    assert min(less) > -1.5
     assert np.mean(less) > -0.7
 
 
