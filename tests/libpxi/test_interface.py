@@ -184,6 +184,13 @@ def test_null_and_small_buffers_are_refused(library):
             render(file.handle, None, pixels, output.bytes, 0, ct.byref(c.Error(size=4))) == c.USAGE
         )
         assert not render(file.handle, None, pixels, output.bytes, 0, None)
+        latents, three, count = library.pxi_latents, (ct.c_int32 * 3)(), ct.c_size_t(3)
+        assert latents(file.handle, 0, None, None, at) == c.USAGE
+        assert latents(file.handle, 99, None, ct.byref(count), at) == c.USAGE
+        assert latents(file.handle, 0, three, ct.byref(count), at) == c.USAGE
+        assert file.error.message == b"the buffer is too small"
+        assert not latents(file.handle, 0, None, ct.byref(count), at)
+        assert count.value > 3
     assert library.pxi_open(None, 1, None, ct.byref(file.handle), at) == c.USAGE
     assert library.pxi_open(b"x", 1, None, None, at) == c.USAGE
     assert library.pxi_open(b"", 0, None, ct.byref(file.handle), at) == c.INVALID
