@@ -217,8 +217,7 @@ def encoded(
     grey = levels if components == 1 else 0
     while grey < levels and not latents.levels[grey][3:].any():
         grey += 1
-    model = registered_model.registered(number)
-    details = synthesis.details(model, latents.levels, step, size)
+    details = synthesis.details(registered_model.registered(number), latents.levels, step, size)
     fields: dict[str, Any] = {
         "model": number,
         "size": list(size),
