@@ -29,8 +29,8 @@ struct Level {
     const uint8_t *bands;    // [height][width], bit b set where band b is coded
     const int32_t *given;    // [9][height][width] to encode, or null to decode
     int32_t *latents;        // [9][height][width], 0
-    // Hears of progress, and stops the work by a 1; or null. Position (y, x) is coded when more than
-    // t + min(height, t / 3 + 1) is done, t = x + 3 y.
+    // Hears of progress, and stops the work by a 1; or null. Position (y, x) is coded when more than x + 3 y is
+    // done.
     int (*watch)(int done, int all);
 };
 
@@ -430,9 +430,9 @@ class LevelCoder {
 
     // Codes the level.
     Wrong run() {
-        int ready = 0;
+        int ready = 0;  // rows of `ahead`
         for (at = 0; at < w + 3 * (h - 1); at++) {
-            if (at % 16 == 0 && s.watch && s.watch(ready + at, h + w + 3 * (h - 1))) return STOPPED;
+            if (at % 16 == 0 && s.watch && s.watch(at, w + 3 * (h - 1))) return STOPPED;
             for (; ready < h && 3 * ready <= at; ready++) look_ahead(ready);
             ys.clear(), before.clear();
             for (int y = std::max((at - w + 3) / 3, 0); y <= std::min(at / 3, h - 1); y++)
