@@ -122,6 +122,6 @@ def synthesized(weights, grid, latents, step):
     """Samples in 0..255 of whole planes, level by level; not clipped, with padding."""
     out = np.ascontiguousarray(latents.lowest.transpose(1, 2, 0), np.float32)
     for level in range(len(latents.levels), 0, -1):
-        found = latents.levels[level - 1]
+        found = np.ascontiguousarray(latents.levels[level - 1], np.int32)
         out = synthesis.finer(weights, level, out, found, step, grid.at(level - 1))
     return synthesis.colours(weights, out, step)
