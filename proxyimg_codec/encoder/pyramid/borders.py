@@ -47,7 +47,7 @@ def bordered(samples: Floats, weight: Floats | None, alpha: bool, step: int) -> 
 
 
 def _near(size: int) -> Floats:
-    """How near samples are to the ends of an axis, float32 [size] in 0..1."""
+    """Nearness of samples to the ends of an axis, float32 [size] in 0..1."""
     ring = max(min(RING, size / 8), 1)
     place = np.arange(size, dtype=np.float32)
     return np.clip(2 - np.minimum(place, size - 1 - place) / ring, 0, 1).astype(np.float32)
