@@ -36,12 +36,23 @@ class Anything:
         return False
 
 
-def _ignoring_holes(paths: Any, *window: Any) -> Any:
-    return np.max([coverage_of([p], *window) for p in paths], axis=0)
+def _paths(segments: coverage.Segments) -> list[Any]:
+    """Paths [3 m, 2] of which segments are; each ends where it began."""
+    paths, own = [], list[Any]()
+    for segment in segments.points:
+        own.append(segment[:3])
+        if (segment[3] == own[0][0]).all():
+            paths.append(np.concatenate(own))
+            own.clear()
+    return paths
 
 
-def _even_odd(paths: Any, *window: Any) -> Any:
-    total = sum(coverage_of([p], *window).astype(np.int64) for p in paths)
+def _ignoring_holes(segments: coverage.Segments, *window: Any) -> Any:
+    return np.max([coverage_of([p], *window) for p in _paths(segments)], axis=0)
+
+
+def _even_odd(segments: coverage.Segments, *window: Any) -> Any:
+    total = sum(coverage_of([p], *window).astype(np.int64) for p in _paths(segments))
     rest = total % (2 * coverage.FULL)
     return np.minimum(rest, 2 * coverage.FULL - rest)
 

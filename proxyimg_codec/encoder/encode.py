@@ -107,7 +107,7 @@ def encode(
         from .pyramid.picture import encode_picture
 
         image = encode_picture(picture, plan, settings, report, finished, source)
-        if settings.texture == "auto":
+        if settings.texture == "auto" and masks is None:
             tell_if_unsuited(standard(np.asarray(pixels)), image)
         return image
     return finished(_with_network(premultiplied, plan, settings, report))

@@ -75,6 +75,7 @@ def open_and_point(studio, photo):
     studio.look("1-empty")
     studio.drop(photo)
     studio.until("studio.store.state.found")
+    studio.shrink()
     studio.look("2-found")
     page.click("#got-it")
 
@@ -144,6 +145,8 @@ def make_editable(studio):
     studio.hears("pixels in")
     page.click("#got-it")
     studio.until("studio.ready()")
+    page.locator(".stage").focus()
+    studio.shrink()
 
 
 def kept(studio, action):
@@ -217,7 +220,7 @@ def bend(studio):
     x0, y0, x1, y1 = next(v["bounds"] for v in studio.state["layers"] if v["name"] == "red")
     studio.until("document.querySelector('.overlay .mesh')")
     spots = [
-        (x0 + u * (x1 - x0), y0 + v * (y1 - y0)) for u, v in ((0.35, 0.9), (0.6, 0.85), (0.5, 0.2))
+        (x0 + u * (x1 - x0), y0 + v * (y1 - y0)) for u, v in ((0.33, 0.88), (0.8, 0.85), (0.5, 0.2))
     ]
     for spot in spots:
         studio.click(*spot)

@@ -11,8 +11,12 @@ from proxyimg_codec.cli.edit import arguments
 from proxyimg_codec.cli.edit_flags import guarded
 from proxyimg_codec.edit.operations import OPERATIONS
 from proxyimg_codec.io import raster
+from proxyimg_codec.limits import Limits
 from proxyimg_codec.studio import words
+from proxyimg_codec.studio.content import opened
+from proxyimg_codec.studio.describe import described
 from proxyimg_codec.studio.edits import FORBIDDEN, regular
+from proxyimg_codec.studio.jobs import Job
 from tests.support.edits import BAD, EDITS, FLAGS
 
 MOVES = {"op": "move", "layer": "disc", "by": [3, -2]}
@@ -26,7 +30,17 @@ PAGE_EDITS = [
     {"op": "order", "layer": "bar", "to": "front"},
     {"op": "texture", "fit": "shape", "source": "bar", "layer": "disc"},
     {"op": "rename", "layer": "disc", "name": "sun"},
-    {"op": "animate", "motion": {"version": 1, "preset": "sway", "duration": 1, "fps": 6}},
+    {
+        "op": "animate",
+        "motion": {
+            "version": 1,
+            "preset": "sway",
+            "layers": {"sun": {}},
+            "duration": 0.5,
+            "fps": 6,
+            "loop": False,
+        },
+    },
     {"op": "remove", "layer": "bar"},
 ]
 """Edits as JavaScript writes them: whole numbers, and keys in any order."""
@@ -38,14 +52,18 @@ def parsed(flags):
     return [edit.values() for edit in args.edits]
 
 
-def test_the_flags_in_the_history_make_the_same_file(studio, small_pxi, tmp_path, tool):
-    made = studio()
-    made.open(small_pxi)
-    state = made.edit(*PAGE_EDITS)
+@pytest.fixture(scope="module")
+def edited(small_pxi, tmp_path_factory):
+    """State after the edits of the page, and the bytes of the file."""
+    content = opened(small_pxi.read_bytes(), "small.pxi", Limits(), 1, Job("open"))
+    content = content.with_edits(PAGE_EDITS, tmp_path_factory.mktemp("none"), ())
+    return described(content, {}, ""), content.edited.to_bytes()
+
+
+def test_the_flags_in_the_history_make_the_same_file(edited, small_pxi, tmp_path, tool):
+    state, data = edited
     flags = [word for step in state["history"] for word in shlex.split(step["flags"])]
     tool("edit", small_pxi, tmp_path / "by-flags.pxi", *flags)
-    saved = made.post("/api/export?wait", {"kind": "pxi"})["result"]
-    data = made.get(saved["url"]).content
     assert (tmp_path / "by-flags.pxi").read_bytes() == data
     assert pxi.from_bytes(data).layers[-1].name == "sun"
 
@@ -54,25 +72,20 @@ def test_the_flags_in_the_history_make_the_same_file(studio, small_pxi, tmp_path
     assert words_of_all[3:] == flags
 
 
-def test_the_python_in_the_history_makes_the_same_file(studio, small_pxi, tmp_path, monkeypatch):
-    made = studio()
-    made.open(small_pxi)
-    state = made.edit(*PAGE_EDITS)
+def test_the_python_in_the_history_makes_the_same_file(edited, small_pxi, monkeypatch):
+    state, data = edited
     monkeypatch.chdir(small_pxi.parent)
     exec(state["python"], {})
-    assert (
-        small_pxi.parent / "edited.pxi"
-    ).read_bytes() == made.session.content.document.to_bytes()
+    assert (small_pxi.parent / "edited.pxi").read_bytes() == data
 
 
-def test_edits_one_by_one_are_those_of_one_request(studio, small_pxi):
-    one, many = studio(), studio()
-    for made in (one, many):
-        made.open(small_pxi)
-    one.edit(*PAGE_EDITS)
+def test_edits_one_by_one_give_the_same_file(edited, studio, small_pxi):
+    made = studio()
+    made.open(small_pxi)
     for edit in PAGE_EDITS:
-        many.edit(edit)
-    assert one.session.content.document.to_bytes() == many.session.content.document.to_bytes()
+        made.edit(edit)
+    saved = made.post("/api/export?wait", {"kind": "pxi"})["result"]
+    assert made.get(saved["url"]).content == edited[1]
 
 
 def test_files_in_edits_are_named_without_places(studio, small_pxi, photo, tmp_path, tool):

@@ -11,6 +11,8 @@ from PIL import Image
 import proxyimg_codec as pxi
 from proxyimg_codec.encoder.shapes.masks import Region
 from proxyimg_codec.io import raster
+from proxyimg_codec.limits import Limits
+from proxyimg_codec.studio.content import opened
 from proxyimg_codec.studio.jobs import CancelledError, Job
 from proxyimg_codec.studio.pointing import Pointing
 from tests.support.pictures import disc, smooth
@@ -63,6 +65,14 @@ def test_a_raster_is_shown_at_once_and_its_layers_follow(studio, picture):
     assert state["found"]
     assert not state["can_undo"]
     assert sum(v["area"] for v in state["regions"]) == SIZE[0] * SIZE[1]
+
+
+@pytest.mark.parametrize("suffix", ["jpg", "webp"])
+def test_pictures_of_other_kinds_are_opened(tmp_path, suffix):
+    raster.write(tmp_path / f"a.{suffix}", smooth(*SIZE))
+    data = (tmp_path / f"a.{suffix}").read_bytes()
+    content = opened(data, f"a.{suffix}", Limits(), 1, Job("open"))
+    assert (content.stage, content.pointing.size) == ("pointing", SIZE)
 
 
 def test_outlines_enclose_what_shows(pointed):

@@ -45,6 +45,10 @@ OVERLAPS = """() => {
     return { left, top, right, bottom };
   };
   const found = [], name = (e) => e.id || e.ariaLabel || e.textContent.slice(0, 30) || e.tagName;
+  const text = (e) => e.tagName === "BUTTON" && e.innerText.trim();
+  const said = (e) => e.ariaLabel || e.labels?.length || text(e);
+  for (const e of boxes)
+    if (e.matches("button, input, select") && !said(e)) found.push(`${name(e)} has no label`);
   boxes.forEach((a, i) => {
     const r = clip(a);
     if (r.right - r.left < 1 || r.bottom - r.top < 1) return;
@@ -59,7 +63,7 @@ OVERLAPS = """() => {
   });
   return found;
 }"""
-"""Finds controls and texts of the page that overlap, or are cut off by the window."""
+"""Finds controls and texts that overlap, are cut off by the window, or have no label."""
 
 
 @contextlib.contextmanager
@@ -115,7 +119,7 @@ class Studio:
         end = time.monotonic() + seconds
         while not self.ask(expression):
             assert time.monotonic() < end, f"{expression} is false for {seconds} s: {self.said}"
-            self.page.wait_for_timeout(20)
+            self.page.wait_for_timeout(60)
 
     @property
     def said(self) -> str:
@@ -235,8 +239,13 @@ class Studio:
         """Row of a layer in the list."""
         return self.page.locator(f'.layers .layer[data-name="{name}"]')
 
+    def shrink(self) -> None:
+        """Shows the picture at 100 %, where drawing it costs less, unless somebody will look."""
+        if not os.environ.get("PXI_SCREENSHOTS"):
+            self.press("1")
+
     def look(self, name: str) -> None:
-        """Checks that nothing overlaps; takes pictures in both themes if they are asked for."""
+        """Checks what `OVERLAPS` finds; takes pictures in both themes if they are asked for."""
         assert self.page.evaluate(OVERLAPS) == [], name
         if not os.environ.get("PXI_SCREENSHOTS"):
             return

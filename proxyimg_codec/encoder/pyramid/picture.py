@@ -78,10 +78,12 @@ def encode_picture(
         soft = softs[k].samples if k in softs else None
         return None if own and k == 0 else copies_of(picture, views[k][1], settings, soft)
 
-    report("hidden", 0, 1)
+    copies = list[Copies | None]()
+    report("hidden", 0, len(views))
     with ThreadPoolExecutor(settings.jobs) as pool:
-        copies = list(pool.map(copied, range(len(views))))
-    report("hidden", 1, 1)
+        for made in pool.map(copied, range(len(views))):
+            copies.append(made)
+            report("hidden", len(copies), len(views))
 
     def picture_of(sources: Sequence[Planes]) -> Picture:
         alpha = sources[1] if shared > 1 else None

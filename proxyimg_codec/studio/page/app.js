@@ -101,7 +101,7 @@ async function group() {
   if (state) { select([name]); layers.renaming(name); }
 }
 
-// Messages, in place. Those of the package begin as parts of a line do.
+// Messages, in place. Errors of the package begin as parts of a line do.
 const sentence = (/** @type {string} */ text) => text.replace(/^[a-z]+ /, (word) => word[0].toUpperCase() + word.slice(1));
 const message = h("div", { class: "message float", hidden: true, "aria-live": "polite" });
 let fade = 0;
@@ -111,7 +111,7 @@ on("message", (m) => {
   if (!m) return;
   message.className = `message float ${m.kind ?? ""}`;
   message.setAttribute("role", m.kind === "error" ? "alert" : "status");
-  message.replaceChildren(icon(m.kind === "error" ? "triangle-alert" : m.kind === "done" ? "check" : "info", 15), h("span", {}, sentence(m.text)),
+  message.replaceChildren(icon(m.kind === "error" ? "triangle-alert" : m.kind === "done" ? "check" : "info", 15), h("span", {}, m.kind === "error" ? sentence(m.text) : m.text),
     ...(m.actions ?? []).map((/** @type {[string, () => void]} */ [text, run]) => button({ text, onclick: run })),
     button({ icon: "x", label: "Close", size: 14, class: "quiet", onclick: () => actions.quiet() }));
   if (!m.actions) fade = window.setTimeout(actions.quiet, m.kind === "error" ? 12000 : 5000);
