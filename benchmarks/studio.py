@@ -63,6 +63,7 @@ def dragged(studio: Studio, start: tuple[float, float], reach: float) -> dict[st
         mouse.move(x + reach * (k % 60 - 30) / 30, y + reach * (k % 40 - 20) / 40)
         time.sleep(max(0.0, begun + k / 60 - time.monotonic()))
     times: dict[str, list[float]] = studio.ask("structuredClone(studio.times)")
+    mouse.move(x, y)  # what was dragged is where it was
     mouse.up()
     return times
 
