@@ -63,15 +63,21 @@ def dragged(studio: Studio, start: tuple[float, float], reach: float) -> dict[st
         mouse.move(x + reach * (k % 60 - 30) / 30, y + reach * (k % 40 - 20) / 40)
         time.sleep(max(0.0, begun + k / 60 - time.monotonic()))
     times: dict[str, list[float]] = studio.ask("structuredClone(studio.times)")
-    mouse.move(x, y)  # what was dragged is where it was
     mouse.up()
     return times
 
 
-def until_exact(studio: Studio, end: tuple[float, float]) -> float:
-    """Milliseconds from letting go of what was dragged to a place until the exact picture."""
+def middle(studio: Studio) -> tuple[float, float]:
+    """Point of the canvas in the middle of the parrot, wherever it has been dragged."""
+    x0, y0, x1, y1 = studio.state["layers"][-1]["bounds"]
+    return (x0 + x1) / 2, (y0 + y1) / 2
+
+
+def until_exact(studio: Studio, by: float) -> float:
+    """Milliseconds from letting go of the parrot, dragged to the right, to the exact picture."""
+    x, y = middle(studio)
     studio.ask("studio.times.exact.splice(0)")
-    studio.drag(RED, end)
+    studio.drag((x, y), (x + by, y))
     studio.until("studio.times.exact.length > 0")
     return float(studio.ask("studio.times.exact.at(-1)"))
 
@@ -103,14 +109,16 @@ def measure(studio: Studio, photo: Path, file: Path) -> None:
     times = dragged(studio, RED, 60)
     print(shown("dragging the parrot", times["frames"], times["pointer"]))
     print(f"| draw calls a frame | {studio.ask('studio.times.calls')} |")
-    rests = [until_exact(studio, (RED[0] + d, RED[1])) for d in (9, -9, 5)]
+    page.wait_for_timeout(1000)
+    rests = [until_exact(studio, by) for by in (9, -9, 5, -5, 9)]
     print(f"| rest to the exact picture | {statistics.median(rests):.0f} ms |")
     page.click("#tool-pins")
     studio.until("document.querySelector('.overlay .mesh')")
     page.get_by_label("Show the mesh").uncheck()
-    for dx, dy in ((-40, 90), (60, 90), (0, 0)):
-        studio.click(RED[0] + dx, RED[1] + dy)
-    times = dragged(studio, RED, 40)
+    x, y = middle(studio)
+    for dx, dy in ((-30, 90), (60, 90), (0, 0)):
+        studio.click(x + dx, y + dy)
+    times = dragged(studio, (x, y), 40)
     nodes = max(v["nodes"] for v in studio.state["layers"])
     print(shown(f"bending it, {nodes} nodes", times["frames"], times["pointer"]))
     studio.press("v")
