@@ -78,12 +78,7 @@ def encode_picture(
         soft = softs[k].samples if k in softs else None
         return None if own and k == 0 else copies_of(picture, views[k][1], settings, soft)
 
-    copies = list[Copies | None]()
-    report("hidden", 0, len(views))
-    with ThreadPoolExecutor(settings.jobs) as pool:
-        for made in pool.map(copied, range(len(views))):
-            copies.append(made)
-            report("hidden", len(copies), len(views))
+    copies = _each_copied(copied, len(views), settings.jobs, report)
 
     def picture_of(sources: Sequence[Planes]) -> Picture:
         alpha = sources[1] if shared > 1 else None
@@ -98,6 +93,19 @@ def encode_picture(
         return finished(found)
 
     return encode_rasters(rasters, shared, picture_of, picture, settings, report)
+
+
+def _each_copied(
+    copied: Callable[[int], Copies | None], count: int, jobs: int, report: Report
+) -> list[Copies | None]:
+    """Finds what is copied into the hidden part of each layer, on several threads."""
+    out = list[Copies | None]()
+    report("hidden", 0, count)
+    with ThreadPoolExecutor(jobs) as pool:
+        for found in pool.map(copied, range(count)):
+            out.append(found)
+            report("hidden", len(out), count)
+    return out
 
 
 def _views(picture: Floats, plan: Plan) -> tuple[list[View], dict[int, Soft]]:
