@@ -125,19 +125,20 @@ def test_crops_show_the_layer_and_its_share(pictures):
 
 
 @pytest.mark.slow
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="Linux tells the peak")
 def test_a_scene_of_512_pixels_needs_less_than_a_gigabyte_and_a_half(tmp_path):
     """Of scene, parameters, crops and one step, beside the guide; in a process of its own."""
     pixels, mask = smooth(512, 512), disc(512, 512)
     pxi.encode(pixels, masks={"disc": mask}, effort=1, texture="pyramid").save(tmp_path / "a.pxi")
     code = f"""
-import resource, sys
 import proxyimg_codec as pxi
 from proxyimg_codec import plugins
 from tests.support.guides import mixture_guide
 plugins.find = lambda kind, name: lambda wishes: mixture_guide([[0.9, 0.2, 0.1]], 0)
 image = pxi.open({str(tmp_path / "a.pxi")!r})
 image.layers["disc"].generated("0", guide="mixture", steps=3, resolution=512, effort=1)
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+# Not ru_maxrss, which begins with the peak of the process that started this one.
+print(open("/proc/self/status").read().split("VmHWM:")[1].split()[0])
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert int(done.stdout) * (1 if sys.platform == "darwin" else 1024) < 1.5e9
+    assert int(done.stdout) * 1024 < 1.5e9
