@@ -89,15 +89,12 @@ def evaluate(problem: Problem, state: State) -> Floats:
 
 
 def of_size(pixels: Pixels, size: int, **settings: Any) -> Image:
-    """Encodes a pyramid of about `size` bytes, or as near as the qualities go."""
+    """Encodes a pyramid of at most `size` bytes, or the smallest one."""
     settings["jobs"] = 1
     try:
         return encode(pixels, target_size=size, **settings)
-    except UsageError:  # out of reach; the flag says no side of it
-        smallest = encode(pixels, quality=0, **settings)
-        if len(smallest.to_bytes()) >= size:
-            return smallest
-        return encode(pixels, quality=100, **settings)
+    except UsageError:
+        return encode(pixels, quality=0, **settings)
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ from ...texture.planes import Planes
 from ...texture.registered_model import registered
 from . import engine_native
 from .borders import bordered
-from .goal import DEAD_ZONE, LEVELS, Effort, Goal, shrink
+from .goal import DEAD_ZONE, LEVELS, RATE_WEIGHT, Effort, Goal, shrink
 from .shifts import SHIFTS, best_shift
 from .window import Window, windows
 
@@ -68,6 +68,12 @@ class Raster(NamedTuple):
         """Columns and rows of samples."""
         return self.samples.shape[1], self.samples.shape[0]
 
+    def bordered(self, step: int) -> Raster:
+        """Raster with the weights of errors at borders; see `borders`."""
+        if self.structural:
+            return self
+        return self._replace(weight=bordered(self.samples, self.weight, self.alpha, step))
+
     def effort(self, effort: Effort) -> Effort:
         """Effort for this raster of that for a picture."""
         least = ALPHA_ROUNDS if self.alpha and effort.rounds else 0
@@ -103,9 +109,7 @@ def encode(
         LimitError: There is not enough memory.
         UnsupportedError: torch is needed and not installed.
     """
-    if not raster.structural:
-        raster = raster._replace(weight=bordered(raster.samples, raster.weight, raster.alpha, step))
-    job = Job(NUMBER, raster, step, threads)
+    job = Job(NUMBER, raster.bordered(step), step, threads)
     complete = True
     try:
         for part in job.parts(effort):
@@ -138,6 +142,7 @@ class Job:
         grid: Sizes of the planes.
         count: Number of levels.
         done: Rounds of moves that were made.
+        price: Error that a bit is worth, in squares of the step.
 
     Args:
         number: Number of the registered model.
@@ -156,7 +161,7 @@ class Job:
         self.picture = np.asarray(raster.samples, np.float32).transpose(2, 0, 1)
         self.support = self._support()
         self.latents = self._analysed()
-        self.done, self.bits = 0, 0.0
+        self.done, self.bits, self.price = 0, 0.0, RATE_WEIGHT
         self.shifts: tuple[int, ...] = ()
         self.find_shifts()
 
@@ -254,7 +259,7 @@ class Job:
         return Goal(
             self.picture[:, rows, columns], None if weight is None else weight[rows, columns],
             support, free, self.step, self.shifts, self.number, structural=self.raster.structural,
-            done=self.done,
+            done=self.done, price=self.price,
         )  # fmt: skip
 
     def _seen(self, box: Window, arrays: Sequence[NDArray[Any]]) -> list[NDArray[Any]]:

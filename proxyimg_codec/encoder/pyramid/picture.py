@@ -61,6 +61,14 @@ def encode_picture(
     """
     height, width = picture.shape[:2]
     views, softs = _views(picture, plan)
+
+    def copied(k: int) -> Copies | None:
+        if k == 0 and behind is not None:
+            return None
+        soft = softs[k].samples if k in softs else None
+        return copies_of(picture, views[k][1], settings, soft)
+
+    copies = _each_copied(copied, len(views), settings.jobs, report)  # before rasters take memory
     rasters = [colour_of(picture)._replace(structural=settings.tune == "ms-ssim")]
     if plan.channels == 4:
         share = coverage_together([v.boundary for v in plan.layers], width, height)
@@ -73,12 +81,6 @@ def encode_picture(
     for k, each in softs.items():
         numbers[k] = {"behind": len(rasters), "matte": len(rasters) + 1}
         rasters += [each.behind, each.matte]
-
-    def copied(k: int) -> Copies | None:
-        soft = softs[k].samples if k in softs else None
-        return None if own and k == 0 else copies_of(picture, views[k][1], settings, soft)
-
-    copies = _each_copied(copied, len(views), settings.jobs, report)
 
     def picture_of(sources: Sequence[Planes]) -> Picture:
         alpha = sources[1] if shared > 1 else None

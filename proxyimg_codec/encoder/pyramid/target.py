@@ -1,13 +1,14 @@
 """Encoding that meets a target: a size of the whole file, or a PSNR of the decoded picture.
 
 The size of a file is nearly exponential in the index of the quantization step, and so is the
-squared error. Estimates of both from latents that are not refined lead to a step; after the first
-rounds of refinement it is corrected, and the latents are scaled. What is coded then is measured;
-if it misses, rounds at other steps follow.
+squared error. Estimates of both from latents that are not refined lead to a step. After the first
+rounds of refinement, estimates are better: the price of a bit is changed, or if they are far off,
+refinement begins anew. What is coded is measured; if it misses, rounds at other prices follow.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -23,7 +24,7 @@ from ...texture.network import Floats
 from ...texture.planes import Planes, encoded
 from ..settings import Settings
 from .encode import NUMBER, TRIAL, Job, Raster
-from .goal import Effort
+from .goal import RATE_WEIGHT, Effort
 
 SLOPES = {"size": (-0.013, -0.0095), "bpp": (-0.013, -0.0095), "psnr": (-0.013, -0.013)}
 """Usual change of a deviation, see `Aim.off`, by an index of the step, towards coarser and towards
@@ -42,8 +43,12 @@ scaled."""
 TRIES, CORRECTIONS = 12, 4
 """Most files that are measured, and how many of these have latents that began at the same step."""
 
-FOLLOWS = 0.5
-"""Share of the usual slope that latents follow which are rounded already."""
+FAR, FOLLOWS = 0.05, 0.11
+"""Expected deviation from which on partly refined latents are given up, and by how much it falls
+when the logarithm of the price of bits rises by 1. (To scale what is rounded loses 0.1 dB.)"""
+
+DEAREST = 3.0
+"""How many times as dear, or as cheap, bits may be as usual."""
 
 
 class Aim(NamedTuple):
@@ -69,15 +74,16 @@ class Aim(NamedTuple):
             return ((99.0 if found is None else found) - self.wanted) / 5
         return self._by_size(len(to_bytes(image)))
 
-    def expected(self, jobs: Sequence[Job], shown: int) -> float:
+    def expected(self, jobs: Sequence[Job], shown: Sequence[Raster]) -> float:
         """Estimate of `off` for latents as they are.
 
         Args:
             jobs: The latents of all rasters.
-            shown: Number of rasters, the first ones, that show in the picture at rest.
+            shown: The first rasters, which show in the picture at rest.
         """
         if self.kind == "psnr":
-            error, count = map(sum, zip(*map(_squared_error, jobs[:shown]), strict=True))
+            each = [_squared_error(*both) for both in zip(jobs, shown, strict=False)]
+            error, count = map(sum, zip(*each, strict=True))
             return (10 * math.log10(255**2 * count / max(error, 1e-9)) - self.wanted) / 5
         return self._by_size(self.fixed + sum(map(_bytes, jobs)))
 
@@ -95,6 +101,12 @@ class Aim(NamedTuple):
     def middle(self) -> float:
         """Deviation to aim at."""
         return (self.low + self.high) / 2
+
+    def worth(self, error: float) -> float:
+        """Rank of a deviation that is not good enough; 0 if it is of no use."""
+        if self.kind == "psnr":
+            return max(1 - abs(error) / 0.1, 0)
+        return math.exp(error) if error < 0 else 0
 
     def _by_size(self, size: float) -> float:
         pixels = self.original[..., 0].size
@@ -124,23 +136,22 @@ def aimed(
     assert settings.target is not None, "there is a target"
     aim = Aim(*settings.target, original, _fixed_bytes(picture_of, len(rasters)))
     search = _Search(aim, rasters, shown, settings, effort)
-    step, fresh = search.estimated(), True
+    step: int | None = search.estimated()
     best: tuple[float, Picture] | None = None
     for turn in range(TRIES):
-        whole = search.refine(step, fresh, first=not turn, tick=tick)
+        whole = search.refine(step, first=not turn, tick=tick)
         image = picture_of([job.planes(keep=True) for job in search.jobs])
         error = aim.off(image)
         if not whole or aim.low <= error <= aim.high:
             return image
-        if error < 0 and (best is None or error > best[0]):
+        if aim.worth(error) > (aim.worth(best[0]) if best else 0):
             best = error, image
-        if fresh:
+        if step is not None:
             search.seen.append((step, error))
-        found = search.next(error, turn)
-        if found is None:
+        step = search.next(error, turn)
+        if any(step == s for s, _ in search.seen):
             break
-        step, fresh = found
-    if best is None or aim.kind == "psnr":
+    if best is None:
         raise UsageError(f"target {aim.kind} {aim.wanted:g} is out of reach for this picture")
     return best[1]
 
@@ -173,77 +184,99 @@ class _Search:
             step = better
         return better
 
-    def refine(self, step: int, fresh: bool, first: bool, tick: Callable[[int], None]) -> bool:
-        """Refines latents at a step.
+    def refine(self, step: int | None, first: bool, tick: Callable[[int], None]) -> bool:
+        """Refines latents.
 
         Args:
-            step: Index of the step.
-            fresh: Whether to begin with those of the picture, and not with those that there are.
-            first: Whether these may be at a step nearby, which may be corrected on the way.
+            step: Index of the step at which to begin; None to go on with what was refined.
+            first: Whether latents are there that were not refined, and the step is an estimate.
             tick: As for `aimed`.
 
         Returns:
             Whether refinement ran to its end.
         """
-        structural = self.rasters[0].structural
-        parts = _parts(self.effort, structural) if first else [self.effort]
-        if not fresh:
-            parts = [Effort(-(-self.effort.steps // 4), 1)]
-        elif not first:
-            self._begin(step)
-        self._rescale(step)
-        try:
-            for number, part in enumerate(parts):
-                if number:
-                    for job in self.jobs:
-                        job.find_shifts()
-                    at, by = self.jobs[0].step, self._expected() / self._slope / FOLLOWS
-                    self._rescale(_bounded(at - min(max(by, -NEAR), NEAR)))
+        if step is None:
+            parts = [[Effort(-(-self.effort.steps // 4), 1)]] * len(self.jobs)
+        else:
+            parts = [_parts(r.effort(self.effort), r.structural) for r in self.rasters]
+            if first:
                 for job in self.jobs:
-                    job.refine_all(part, self.settings.seed, tick)
+                    job.rescale(step)
+            else:
+                self._begin(step)
+        stages = list(itertools.zip_longest(*parts))
+        try:
+            self._run(stages[0], tick)
+            if first and len(stages) > 1 and stages[1][0]:
+                error = self._refined()
+                if abs(error) > FAR:
+                    self._begin(self._moved(error, self.jobs[0].step))
+                    self._run(stages[0], tick)
+                    error = self._refined()
+                self._pay(error / FOLLOWS)
+            for stage in stages[1:]:
+                self._run(stage, tick)
         except KeyboardInterrupt:
             return False
         return True
 
-    def next(self, error: float, turn: int) -> tuple[int, bool] | None:
-        """Step to try after a deviation, and whether to begin anew there; None if there is none."""
-        step, done = self.jobs[0].step, self.jobs[0].done
-        by = (error + self._gain(done, done + 1) - self.aim.middle) / self._slope
-        by /= 0.3 + 0.3 / done  # what was refined for long hardly follows
-        better = _bounded(step - (by if abs(by) >= 1 else math.copysign(1, by)))
-        if abs(better - step) <= NEAR and turn % CORRECTIONS < CORRECTIONS - 1:
-            return (better, False) if better != step else None
-        better = self._between([(s, e - self.aim.middle) for s, e in self.seen])
-        return None if any(better == s for s, _ in self.seen) else (better, True)
+    def _run(self, stage: Sequence[Effort | None], tick: Callable[[int], None]) -> None:
+        """Refines the latents of each raster that has a part in a stage."""
+        for job, part in zip(self.jobs, stage, strict=True):
+            if part:
+                job.refine_all(part, self.settings.seed, tick)
 
-    @property
-    def _slope(self) -> float:
-        return SLOPES[self.aim.kind][1]
+    def _refined(self) -> float:
+        """Deviation from what is aimed at that is expected of latents that are partly refined."""
+        for job in self.jobs:
+            job.find_shifts()
+        return self._expected()
+
+    def next(self, error: float, turn: int) -> int | None:
+        """Prepares for another try after a deviation.
+
+        Returns:
+            The step at which to begin anew; None if prices have changed, for a round more.
+        """
+        done, step = self.jobs[0].done, self.jobs[0].step
+        by = (error + self._gain(done, done + 1) - self.aim.middle) / _follows(self.aim.kind, step)
+        ended = step == (LAST_STEP if error > 0 else FIRST_STEP)
+        if turn % CORRECTIONS < CORRECTIONS - 1 and not ended and self._pay(by):
+            return None
+        return self._between([(s, e - self.aim.middle) for s, e in self.seen])
+
+    def _pay(self, by: float) -> bool:
+        """Raises the price of bits by a logarithm; False if it would be too far from the usual."""
+        price = self.jobs[0].price * math.exp(by)
+        fits = 1 / DEAREST <= price / RATE_WEIGHT <= DEAREST
+        for job in self.jobs:
+            job.price = min(max(price, RATE_WEIGHT / DEAREST), RATE_WEIGHT * DEAREST)
+        return fits
 
     def _begin(self, step: int) -> None:
         self.jobs.clear()  # they make room first
-        self.jobs += [Job(NUMBER, r, step, self.settings.jobs) for r in self.rasters]
-
-    def _rescale(self, step: int) -> None:
-        for job in self.jobs:
-            job.rescale(step)
+        jobs = self.settings.jobs
+        self.jobs += [Job(NUMBER, r.bordered(step), step, jobs) for r in self.rasters]
 
     def _expected(self) -> float:
         """Deviation from what is aimed at that is expected of latents once they are refined."""
         gain = self._gain(self.jobs[0].done, self.effort.rounds)
-        return self.aim.expected(self.jobs, self.shown) + gain - self.aim.middle
+        return self.aim.expected(self.jobs, self.rasters[: self.shown]) + gain - self.aim.middle
 
     def _gain(self, done: int, rounds: int) -> float:
         kind, step = self.aim.kind, self.jobs[0].step
         return _gained(kind, rounds, step) - _gained(kind, done, step)
+
+    def _moved(self, error: float, step: int) -> int:
+        """Step at which a deviation at another is likely 0."""
+        return _bounded(step - error / SLOPES[self.aim.kind][error < 0])
 
     def _between(self, tried: Sequence[tuple[int, float]]) -> int:
         """Step at which the deviation is likely 0, by those at other steps."""
         over = max((t for t in tried if t[1] > 0), default=None)
         under = min((t for t in tried if t[1] <= 0), default=None)
         if over is None or under is None or over[0] >= under[0]:
-            step, error = tried[-1]
-            return _bounded(step - error / SLOPES[self.aim.kind][error < 0])
+            return self._moved(tried[-1][1], tried[-1][0])
         share = over[1] / (over[1] - under[1])
         return _bounded(over[0] + min(max(share, 0.1), 0.9) * (under[0] - over[0]))
 
@@ -269,6 +302,11 @@ def _gained(kind: str, rounds: int, step: int) -> float:
     return 0.021 + 0.0285 * coarser + (0.011 if rounds == 1 else 0)
 
 
+def _follows(kind: str, step: int) -> float:
+    """Fall of a deviation when the logarithm of the price rises by 1, with one round to come."""
+    return 0.075 if kind == "psnr" else max(0.06 + 0.03 * (step - 320) / 100, 0.02)
+
+
 def _fixed_bytes(picture_of: Callable[[Sequence[Planes]], Picture], count: int) -> int:
     """Bytes of a picture whose planes are tiny, without their streams."""
     zeros = np.zeros((9, 4, 4), np.int32)
@@ -283,12 +321,16 @@ def _bytes(job: Job) -> float:
     return (job.bits + plane.size * math.log2(2 * math.e * (mean + 0.3))) / 8
 
 
-def _squared_error(job: Job) -> tuple[float, int]:
-    """Sum of weighted squared errors of the samples of a job, in levels of 8 bits; their number."""
+def _squared_error(job: Job, raster: Raster) -> tuple[float, int]:
+    """Sum of the squared errors of samples, in levels of 8 bits, by the weights of a raster.
+
+    Returns:
+        The sum, and the number of samples.
+    """
     error = np.rint(job.samples() * np.float32(255))
-    error -= job.raster.samples
+    error -= raster.samples
     by_pixel = np.einsum("yxc,yxc->yx", error, error)
-    if job.raster.weight is not None:
-        by_pixel *= job.raster.weight
-    components = 1 if job.raster.grey else 3
+    if raster.weight is not None:
+        by_pixel *= raster.weight
+    components = 1 if raster.grey else 3
     return float(by_pixel.sum(dtype=np.float64)) * components / 3, by_pixel.size * components
