@@ -124,13 +124,15 @@ def _tile(painters: Sequence[_Painter], box: Rectangle) -> Floats:
 
 def _together(painters: Sequence[_Painter], box: Rectangle) -> Floats | None:
     """Renders `_tile` if all layers show the same samples, as in a picture at rest; else None."""
+    if not all(painter.plain for painter in painters):
+        return None
     shown: list[still.Still] = []
     covers: list[NDArray[np.int32] | None] = []
     for painter in painters:
-        covered = painter.covered(box) if painter.plain else None
+        covered = painter.covered(box)
         if covered is not None and not covered.any():
             continue
-        found = painter.still(box) if painter.plain else None
+        found = painter.still(box)
         if found is None or found.samples is not (shown or [found])[0].samples:
             return None
         shown.append(found)
@@ -187,6 +189,7 @@ class _Painter:
             and (texture.cuts is None or texture.cuts.within is None)
         )
         self._window = self._needed()
+        self._covered: tuple[Rectangle, NDArray[np.int32]] | None = None
 
     def _needed(self) -> Window | None:
         """Samples of the part of a pyramid texture that the view needs; None if it may be all."""
@@ -234,10 +237,9 @@ class _Painter:
 
     def _blank(self, box: Rectangle) -> Sheet:
         _, _, w, h = box
-        if self._paths is None:
-            return Sheet(None, 0, h * w)
         covered = self.covered(box)
-        assert covered is not None, "there are paths"
+        if covered is None:
+            return Sheet(None, 0, h * w)
         seen = np.flatnonzero(covered.max(1))  # faster than any(1)
         first, last = (int(seen[0]), int(seen[-1]) + 1) if len(seen) else (0, 0)
         share = covered[first:last].ravel().astype(np.float32) / np.float32(cover.FULL)
@@ -273,7 +275,11 @@ class _Painter:
 
     def covered(self, box: Rectangle) -> NDArray[np.int32] | None:
         """Coverage int32 [h, w] of a rectangle in 0..`cover.FULL`; None where all is covered."""
-        return None if self._paths is None else cover.coverage(self._paths, *box, self._budget)
+        if self._paths is None:
+            return None
+        if self._covered is None or self._covered[0] != box:  # a tile asks twice, at most
+            self._covered = box, cover.coverage(self._paths, *box, self._budget)
+        return self._covered[1]
 
     def still(self, box: Rectangle) -> still.Still | None:
         """Samples that the points of a rectangle lie on; None if they are not that simple."""

@@ -11,7 +11,7 @@ from proxyimg_codec.model import Layers
 from proxyimg_codec.render import compose
 from proxyimg_codec.texture.planes import Planes
 from tests.support.images import changed
-from tests.support.pyramids import SIZE, filled, picture, planes, showing, view
+from tests.support.pyramids import SIZE, cut_picture, filled, picture, planes, showing, view
 from tests.support.textures import ENGINES
 
 
@@ -22,6 +22,25 @@ def test_at_rest_the_picture_is_the_raster(pyramid):
     np.testing.assert_allclose(out, expected, atol=1e-6)
     assert pyramid.networks == ()
     assert not any(filled(v.texture) for v in pyramid.layers)
+
+
+@pytest.mark.parametrize("scale", [1, 2])
+@pytest.mark.parametrize("by", [None, (0, 0), (3, -2)])
+def test_outlines_are_covered_once_for_each_tile(monkeypatch, scale, by):
+    """Work counts against limits: nothing is computed to be thrown away."""
+    asked, own = [], compose.cover.coverage
+
+    def counted(paths, *box_and_budget):
+        asked.append((id(paths), box_and_budget[:4]))
+        return own(paths, *box_and_budget)
+
+    monkeypatch.setattr(compose.cover, "coverage", counted)
+    monkeypatch.setattr(compose, "TILE_SAMPLES", 700)
+    still = Image(cut_picture())
+    image = still if by is None else still.layers[1].moved(*by)
+    image.render(scale=scale)
+    assert len(asked) > 2
+    assert len(asked) == len(set(asked))
 
 
 def test_what_was_hidden_is_smooth(pyramid):
