@@ -31,7 +31,8 @@ struct Refine {
     float step, price, share, hesitation;  // as in refine.py
     float *const *slopes;               // of the same shapes as the latents
     double *cost;                       // [2] error and bits, or [levels][2][16] bits by shift
-    int (*watch)(int done, int all);    // stops the work by a 1
+    int (*watch)(void *listener, int done, int all);  // stops the work by a 1
+    void *listener;
 };
 
 class Refiner {
@@ -220,13 +221,13 @@ class Refiner {
         for (int turn = 0;; turn++) {
             if (turn && turn == s.rounds && s.done + turn < s.sure) {
                 keep();
-                if (s.watch) s.watch(turn, s.rounds);
+                if (s.watch) s.watch(s.listener, turn, s.rounds);
                 break;
             }
             forward();
             const double total = error() + s.price * spent();
             if (total < lowest) lowest = total, keep();
-            if ((s.watch && s.watch(turn, s.rounds)) || turn == s.rounds) break;
+            if ((s.watch && s.watch(s.listener, turn, s.rounds)) || turn == s.rounds) break;
             backward();
             move_latents(s.done + turn);
         }

@@ -13,7 +13,7 @@ from ..errors import FormatError, LimitError
 from ..native import kernel
 from . import context
 from .context import Ints, Place
-from .watch import LISTENED, Watch
+from .watch import WATCH, Watch
 
 WEIGHTS = (
     "first", "first_bias", "second", "second_bias", "causal", "mix", "mix_bias", "luma",
@@ -76,7 +76,7 @@ class _Level(ct.Structure):
         ("logs", ct.c_void_p),
         ("n_logs", ct.c_int64),
         *((n, ct.c_void_p) for n in ("low", "parent", "bands", "given", "latents")),
-        ("watch", LISTENED),
+        ("watch", WATCH),
         ("listener", ct.c_void_p),
     ]
 

@@ -15,7 +15,7 @@ from .context import Ints
 from .grid import Window
 from .network import Floats
 from .registered_model import Synthesis
-from .watch import LISTENED, Watch
+from .watch import WATCH, Watch
 
 ARRAYS = (
     "linear", "first", "first_bias", "second", "second_bias", "third", "third_bias", "gain",
@@ -31,7 +31,7 @@ class _Level(ct.Structure):
         *((n, ct.c_void_p) for n in ("low", "latents", "colours", "out")),
         *((n, ct.c_int64) for n in ("low_line", "line", "band", "out_line")),
         *((n, ct.c_int32) for n in ("top", "bottom", "left", "right")),
-        ("watch", LISTENED),
+        ("watch", WATCH),
         ("listener", ct.c_void_p),
     ]
 

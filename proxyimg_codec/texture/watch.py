@@ -7,11 +7,9 @@ from typing import Any
 
 from ..progress import listener, worked
 
-WATCH = ct.CFUNCTYPE(ct.c_int, ct.c_int, ct.c_int)
-"""Type of the function that the kernel calls with the steps done and all steps; 1 stops it."""
-
-LISTENED = ct.CFUNCTYPE(ct.c_int, ct.c_void_p, ct.c_int, ct.c_int)
-"""The same of decoding, which tells it who listens, too."""
+WATCH = ct.CFUNCTYPE(ct.c_int, ct.c_void_p, ct.c_int, ct.c_int)
+"""Type of the function that the kernel calls with who listens, which is null here, the steps done
+and all steps; 1 stops it."""
 
 
 class Watch:
@@ -27,7 +25,7 @@ class Watch:
     def __init__(self, amount: int) -> None:
         self._amount, self._told = amount, 0
         self._raised: BaseException | None = None
-        self.function: Any = LISTENED(self._hear) if listener() else LISTENED()
+        self.function: Any = WATCH(self._hear) if listener() else WATCH()
 
     def _hear(self, _: int | None, done: int, steps: int) -> int:
         more = self._amount * done // steps - self._told

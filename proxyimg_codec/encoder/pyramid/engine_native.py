@@ -72,6 +72,7 @@ class _Refine(ct.Structure):
         *((n, ct.c_float) for n in ("step", "price", "share", "hesitation")),
         *((n, ct.c_void_p) for n in ("slopes", "cost")),
         ("watch", WATCH),
+        ("listener", ct.c_void_p),
     ]
 
 
@@ -244,7 +245,7 @@ def improved(
         return found, None
     raised: list[BaseException] = []
 
-    def heard(done: int, rounds: int) -> int:
+    def heard(_: int | None, done: int, rounds: int) -> int:
         try:
             if done:
                 tick()
