@@ -64,12 +64,8 @@ def _add_aims(p: argparse.ArgumentParser) -> None:
     add("-q", "--quality", type=float, metavar="0-100", help="default 50")
     add("--target-bpp", type=float, metavar="B", help="most bits a pixel of the whole file, "
         "and 2 %% less at the least, instead of -q")  # fmt: skip
-    add(
-        "--target-size",
-        type=float,
-        metavar="BYTES",
-        help="most bytes of the whole file, and 2 %% less at the least, instead of -q",
-    )
+    add("--target-size", type=float, metavar="BYTES", help="most bytes of the whole file, "
+        "and 2 %% less at the least, instead of -q")  # fmt: skip
     add("--target-psnr", type=float, metavar="DB", help="PSNR of the decoded picture, within 0.1, "
         "instead of -q")  # fmt: skip
     add("--tune", choices=["mse", "ms-ssim"], default="mse", help="what to be good at: PSNR "

@@ -12,7 +12,7 @@ from proxyimg_codec.encoder.pyramid.encode import EFFORTS, Job, Raster
 from proxyimg_codec.errors import UsageError
 from proxyimg_codec.io import raster
 from proxyimg_codec.render.quality import psnr
-from tests.encoder.pyramid.test_encode import textured
+from tests.encoder.pyramid.test_encode import Interrupting, textured
 from tests.support.paths import ROOT
 
 FAST = {"texture": "pyramid", "effort": 1, "jobs": 1, "max_layers": 1}
@@ -133,15 +133,7 @@ def test_latents_are_scaled_to_another_step():
 
 
 def test_an_interrupt_ends_the_search():
-    calls = 0
-
-    def progress(stage, done, total):
-        nonlocal calls
-        calls += stage == "texture"
-        if calls == 2:
-            raise KeyboardInterrupt
-
-    picture = textured(96, 80)
+    picture, progress = textured(96, 80), Interrupting(2)
     image = encode(picture, target_size=1500, progress=progress, **FAST | {"effort": 7})
-    assert calls == 2
+    assert progress.calls == 2
     assert psnr(picture, image) > 25
